@@ -1,0 +1,1 @@
+//! inekf-tests

@@ -1,0 +1,234 @@
+//! One filter for any mismatch: interacting multiple models over the augmented state.
+//!
+//! Every mode j is a hypothesis on how the P mismatches e behave: absent, constant, drawn anew each step,
+//! coming and going. Each runs a left-invariant filter on `G x R^P`; its weight follows the likelihood of the
+//! innovations, and a Markov chain with the rates of [`Switching`] lets modes follow each other. A mode that
+//! stays keeps its mismatches; a mode that is entered draws them from its own prior:
+//!
+//! ```text
+//! mixing      c_j = (stay_j + p_jj) mu_j + sum_{i != j} p_ij mu_i
+//!             belief_j <- merge (stay_j mu_j: belief_j;  p_ij mu_i: belief_i, mismatches redrawn from mode j)
+//! motion      xi+ = F xi + T (e + white_j) + w,   e+ = e + walk_j
+//! update      N_j = N + H_e diag(white_j^2) H_e^T,   mu_j = c_j N(z_j; 0, S_j) / sum
+//! estimate    merge_j (mu_j, belief_j)
+//! ```
+//!
+//! F, T and H are those of [`Unknowns`] at the mode's own estimate of the mismatches, so that the bank has no
+//! models of its own: it is a way to run [`update`] several times. Merging is that of [`mixture`]; the modes
+//! that serve every pattern are [`standard_modes`]. Measured in `docs/adaptive-mismatch.md`.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::belief::Belief;
+use super::propagate::moved;
+use super::side::Left;
+use super::update::{UpdateError, UpdateOptions, Verdict, update};
+use crate::lie::LieGroup;
+use crate::model::{Augmented, Observation, OdometryStep, RigidPose, Unknowns};
+
+pub mod mixture;
+pub mod modes;
+
+use mixture::{Chart, Local, merged, moments};
+pub use modes::{Expected, Mode, STANDARD_MODES, Switching, standard_modes};
+
+/// A bank of S augmented filters on `G x R^P`, `D = B + P`, with B the dimension of G.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptive<G, const B: usize, const P: usize, const D: usize, const S: usize> {
+    modes: [Mode<P>; S],
+    switching: Switching<S>,
+    options: UpdateOptions,
+    beliefs: [Belief<Augmented<G, B, P, D>, Left, D>; S],
+    weights: [f64; S],
+    /// Time since the modes were last mixed, s.
+    unmixed_s: f64,
+    /// Whether a measurement came since the modes were last mixed.
+    measured: bool,
+}
+
+/// An observation with the noise that a mode adds to it.
+struct WithNoise<'a, O, const M: usize> {
+    inner: &'a O,
+    noise: SMatrix<f64, M, M>,
+}
+
+impl<G, O, const D: usize, const M: usize> Observation<G, D, M> for WithNoise<'_, O, M>
+where
+    G: LieGroup<D>,
+    O: Observation<G, D, M>,
+{
+    fn residual(&self, chi: &G) -> SVector<f64, M> {
+        self.inner.residual(chi)
+    }
+
+    fn left_jacobian(&self, chi: &G) -> SMatrix<f64, M, D> {
+        self.inner.left_jacobian(chi)
+    }
+
+    fn noise(&self) -> SMatrix<f64, M, M> {
+        self.noise
+    }
+}
+
+impl<G, const B: usize, const P: usize, const D: usize, const S: usize> Adaptive<G, B, P, D, S>
+where
+    G: LieGroup<B>,
+{
+    /// The bank whose modes all start from `prior`, each with mismatches from its own prior. The gate of
+    /// `options` is the bank's, see [`update`](Self::update).
+    pub fn new(
+        prior: &Belief<G, Left, B>,
+        modes: [Mode<P>; S],
+        switching: Switching<S>,
+        options: UpdateOptions,
+    ) -> Self {
+        let chart = Chart {
+            reference: Augmented::new(prior.mean, SVector::zeros()),
+        };
+        let mut bare = Local {
+            xi: SVector::zeros(),
+            covariance: SMatrix::<f64, D, D>::zeros(),
+        };
+        add_block(prior.covariance.matrix(), &mut bare.covariance);
+        Self {
+            modes,
+            switching,
+            options,
+            beliefs: modes.map(|mode| {
+                let mut entered = bare;
+                redraw(&mut entered, &chart, &mode);
+                chart.leave(&entered)
+            }),
+            weights: switching.initial,
+            unmixed_s: 0.0,
+            measured: false,
+        }
+    }
+
+    /// Moves every mode by one step of odometry, seen with its own mismatches; `q` is the covariance of the
+    /// step's noise, B x B, of the left-invariant error.
+    pub fn advance<const N: usize>(
+        &mut self,
+        unknowns: &Unknowns<'_>,
+        step: &OdometryStep<G>,
+        q: &SMatrix<f64, B, B>,
+    ) where
+        G: RigidPose<B, N>,
+    {
+        // Between two measurements nothing tells the modes apart: they are mixed once.
+        if self.measured {
+            self.mix();
+            self.measured = false;
+        }
+        for (belief, mode) in self.beliefs.iter_mut().zip(&self.modes) {
+            let actual = unknowns.step(step, &belief.mean);
+            let mean = Augmented::new(actual.step.apply(&belief.mean.pose), belief.mean.parameters);
+            let mut noise = mode.noise_of_motion(&actual.left_jacobian, step.dt_s);
+            add_block(q, &mut noise);
+            *belief = moved(belief, mean, &actual.left_jacobian, &noise);
+        }
+        self.unmixed_s += step.dt_s;
+    }
+
+    /// Corrects every mode with `observation` and weighs it by how well it foretold it.
+    ///
+    /// The observation is refused if it is beyond the gate of every mode: one that some mode can explain is
+    /// evidence for that mode, not an outlier.
+    ///
+    /// # Errors
+    /// [`UpdateError`] if a mode could not be corrected; the bank is then unchanged, as it is when the
+    /// observation is gated.
+    pub fn update<O, const M: usize>(&mut self, observation: &O) -> Result<Verdict, UpdateError>
+    where
+        O: Observation<Augmented<G, B, P, D>, D, M>,
+    {
+        let ungated = UpdateOptions {
+            gate: f64::INFINITY,
+            ..self.options
+        };
+        let mut beliefs = self.beliefs;
+        let mut logs = [f64::NEG_INFINITY; S];
+        let mut least_nis = f64::INFINITY;
+        for (j, belief) in beliefs.iter_mut().enumerate() {
+            let h = observation.left_jacobian(&belief.mean);
+            let noisy = WithNoise {
+                inner: observation,
+                noise: observation.noise() + self.modes[j].noise_of_measurement(&h),
+            };
+            let correction = update(belief, &noisy, &ungated)?;
+            least_nis = least_nis.min(correction.nis);
+            logs[j] = self.weights[j].ln() - 0.5 * (correction.nis + correction.log_determinant);
+        }
+        if least_nis > self.options.gate {
+            return Ok(Verdict::Gated);
+        }
+        let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let likelihoods = logs.map(|log| (log - best).exp());
+        let total: f64 = likelihoods.iter().sum();
+        self.weights = likelihoods.map(|likelihood| likelihood / total);
+        self.beliefs = beliefs;
+        self.measured = true;
+        Ok(Verdict::Accepted)
+    }
+
+    /// The weights of the modes, which add up to one.
+    pub fn weights(&self) -> &[f64; S] {
+        &self.weights
+    }
+
+    /// The estimate of pose and mismatches: the one Gaussian with the moments of the bank.
+    pub fn estimate(&self) -> Belief<Augmented<G, B, P, D>, Left, D> {
+        merged(&self.weights, &self.beliefs).unwrap_or(self.beliefs[0])
+    }
+
+    /// Lets modes follow each other over the time since this was last done.
+    fn mix(&mut self) {
+        let dt_s = self.unmixed_s;
+        self.unmixed_s = 0.0;
+        let chart = Chart::at_heaviest(&self.weights, &self.beliefs);
+        let locals = self.beliefs.each_ref().map(|belief| chart.enter(belief));
+        let mut weights = [0.0; S];
+        for j in 0..S {
+            let stay = self.weights[j] * self.switching.staying(j, dt_s);
+            let come: [f64; S] =
+                core::array::from_fn(|i| self.weights[i] * self.switching.probability(i, j, dt_s));
+            let coming: f64 = come.iter().sum();
+            weights[j] = stay + coming;
+            let Some(mut entered) = moments(come.into_iter().zip(&locals)) else {
+                continue;
+            };
+            redraw(&mut entered, &chart, &self.modes[j]);
+            let parts = [(stay, &locals[j]), (coming, &entered)];
+            if let Some(mixed) = moments(parts.into_iter()) {
+                self.beliefs[j] = chart.leave(&mixed);
+            }
+        }
+        self.weights = weights;
+    }
+}
+
+/// Adds `block` to the upper left corner of `whole`.
+fn add_block<const B: usize, const D: usize>(
+    block: &SMatrix<f64, B, B>,
+    whole: &mut SMatrix<f64, D, D>,
+) {
+    let mut corner = whole.fixed_view_mut::<B, B>(0, 0);
+    corner += block;
+}
+
+/// Draws the mismatches of `local` anew from the prior of `mode`, independent of the pose.
+fn redraw<G, const B: usize, const P: usize, const D: usize>(
+    local: &mut Local<D>,
+    chart: &Chart<Augmented<G, B, P, D>>,
+    mode: &Mode<P>,
+) {
+    for k in 0..P {
+        for other in 0..D {
+            local.covariance[(other, B + k)] = 0.0;
+            local.covariance[(B + k, other)] = 0.0;
+        }
+        local.covariance[(B + k, B + k)] = mode.entry_sigma[k] * mode.entry_sigma[k];
+        // A mismatch of zero, in coordinates relative to the reference.
+        local.xi[B + k] = -chart.reference.parameters[k];
+    }
+}

@@ -1,0 +1,118 @@
+//! The first belief: level from the accelerometer, heading and the rest from what is known.
+//!
+//! At rest the specific force is `-R^T g_w`, which gives roll and pitch; heading stays a prior,
+//! as wide as it must be. Uncertainties are stated about world axes (tilt about x and y, heading
+//! about z) and carried to the body axes of the left-invariant error.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::belief::Belief;
+use super::covariance::Covariance;
+use super::side::Side;
+use crate::lie::{LieGroup, SE23, SO3, hat};
+use crate::model::InertialState;
+
+/// An attitude found by levelling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Levelled {
+    /// Body to world.
+    pub r_wb: SO3,
+}
+
+impl Levelled {
+    /// Roll and pitch from the mean specific force `force_b` (m/s^2, body frame), heading as given
+    /// (rad, counter-clockwise from east). `None` if the force is too small to show where up is.
+    pub fn from_force(force_b: &Vector3<f64>, heading: f64) -> Option<Self> {
+        let norm = force_b.norm();
+        if !(norm.is_finite() && norm > 1.0) {
+            return None;
+        }
+        let up_b = force_b / norm;
+        let roll = up_b.y.atan2(up_b.z);
+        let pitch = (-up_b.x).atan2((up_b.y * up_b.y + up_b.z * up_b.z).sqrt());
+        Some(Self {
+            r_wb: SO3::from_roll_pitch_heading(roll, pitch, heading),
+        })
+    }
+}
+
+/// Means and standard deviations of the biases.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BiasPrior {
+    /// Gyroscope bias, rad/s, body frame.
+    pub gyro_bias: Vector3<f64>,
+    /// Its standard deviation per axis, rad/s.
+    pub gyro_sigma: f64,
+    /// Accelerometer bias, m/s^2, body frame.
+    pub accel_bias: Vector3<f64>,
+    /// Its standard deviation per axis, m/s^2.
+    pub accel_sigma: f64,
+}
+
+/// Everything the first belief is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alignment {
+    /// Attitude, body to world.
+    pub r_wb: SO3,
+    /// Standard deviation of the tilt about each horizontal world axis, rad.
+    pub tilt_sigma: f64,
+    /// Standard deviation of the heading about the vertical, rad.
+    pub heading_sigma: f64,
+    /// Velocity, m/s, world frame.
+    pub velocity_w: Vector3<f64>,
+    /// Standard deviation of the velocity per axis, m/s.
+    pub velocity_sigma: f64,
+    /// Position of the point `lever_arm_b` away from the IMU, m, world frame.
+    pub position_w: Vector3<f64>,
+    /// Covariance of that position, m^2, world axes.
+    pub position_covariance_w: Matrix3<f64>,
+    /// From the IMU to the point whose position is known (an antenna), m, body frame.
+    pub lever_arm_b: Vector3<f64>,
+    /// The biases; ignored by states without them.
+    pub biases: BiasPrior,
+}
+
+impl Alignment {
+    /// The belief. Where the antenna is known rather than the IMU, position and attitude errors
+    /// are correlated through the lever arm: `xi_p = -R^T n + [l]x xi_R`.
+    pub fn belief<G: InertialState<D>, S: Side, const D: usize>(&self) -> Belief<G, S, D> {
+        let r_wb = self.r_wb.matrix();
+        let to_body = r_wb.transpose();
+        let tilt = self.tilt_sigma * self.tilt_sigma;
+        let attitude_w = Matrix3::from_diagonal(&Vector3::new(
+            tilt,
+            tilt,
+            self.heading_sigma * self.heading_sigma,
+        ));
+        let attitude_b = to_body * attitude_w * r_wb;
+        let lever = hat(&self.lever_arm_b);
+
+        let mut variances = SVector::<f64, D>::zeros();
+        variances
+            .fixed_rows_mut::<3>(3)
+            .fill(self.velocity_sigma * self.velocity_sigma);
+        if D >= 15 {
+            for axis in 0..3 {
+                variances[9 + axis] = self.biases.gyro_sigma * self.biases.gyro_sigma;
+                variances[12 + axis] = self.biases.accel_sigma * self.biases.accel_sigma;
+            }
+        }
+        let mut p = SMatrix::<f64, D, D>::from_diagonal(&variances);
+        p.fixed_view_mut::<3, 3>(0, 0).copy_from(&attitude_b);
+        p.fixed_view_mut::<3, 3>(0, 6)
+            .copy_from(&(attitude_b * lever.transpose()));
+        p.fixed_view_mut::<3, 3>(6, 6).copy_from(
+            &(to_body * self.position_covariance_w * r_wb + lever * attitude_b * lever.transpose()),
+        );
+
+        let pose = SE23 {
+            rotation: self.r_wb.normalized(),
+            velocity: self.velocity_w,
+            position: self.position_w - self.r_wb.rotate(&self.lever_arm_b),
+        };
+        Belief::from_left_covariance(
+            G::from_parts(pose, self.biases.gyro_bias, self.biases.accel_bias),
+            Covariance::from_upper(p),
+        )
+    }
+}

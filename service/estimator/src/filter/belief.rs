@@ -1,0 +1,66 @@
+//! A concentrated Gaussian on a Lie group: a mean, and the covariance of the invariant error.
+
+use core::marker::PhantomData;
+
+use super::covariance::Covariance;
+use super::side::{Left, Right, Side};
+use crate::lie::LieGroup;
+
+/// `chi = retract(mean, xi)` with `xi ~ N(0, covariance)`, in the error of side S (\[IS\] (4)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Belief<G, S, const D: usize> {
+    /// The estimate.
+    pub mean: G,
+    /// Covariance of the error, tangent order of the group.
+    pub covariance: Covariance<D>,
+    side: PhantomData<S>,
+}
+
+impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
+    /// The belief with this mean and this covariance of the error of side S.
+    pub fn new(mean: G, covariance: Covariance<D>) -> Self {
+        Self {
+            mean,
+            covariance,
+            side: PhantomData,
+        }
+    }
+
+    /// The belief whose left-invariant error has this covariance.
+    pub fn from_left_covariance(mean: G, covariance: Covariance<D>) -> Self {
+        let covariance = if S::IS_LEFT {
+            covariance
+        } else {
+            covariance.transformed(&S::from_left(&mean))
+        };
+        Self::new(mean, covariance)
+    }
+
+    /// Covariance of the left-invariant error, which is what is published.
+    pub fn left_covariance(&self) -> Covariance<D> {
+        if S::IS_LEFT {
+            self.covariance
+        } else {
+            self.covariance.transformed(&S::to_left(&self.mean))
+        }
+    }
+
+    /// Whether mean and covariance are finite and no variance is negative.
+    pub fn is_plausible(&self) -> bool {
+        self.mean.is_finite() && self.covariance.is_plausible()
+    }
+}
+
+impl<G: LieGroup<D>, const D: usize> Belief<G, Left, D> {
+    /// The same belief in the right-invariant error (\[PAR\] (14) with `A = Ad_chi`).
+    pub fn to_right(&self) -> Belief<G, Right, D> {
+        Belief::from_left_covariance(self.mean, self.covariance)
+    }
+}
+
+impl<G: LieGroup<D>, const D: usize> Belief<G, Right, D> {
+    /// The same belief in the left-invariant error.
+    pub fn to_left(&self) -> Belief<G, Left, D> {
+        Belief::new(self.mean, self.left_covariance())
+    }
+}

@@ -1,0 +1,295 @@
+//! The algebra of linear constraints on a gain: the best L with `L Delta = T`, \[LC\] (19) and (22).
+//!
+//! ```text
+//! Gamma = T - K Delta    Psi = Delta^T S^-1 Delta    L = K + Gamma Psi^-1 Delta^T S^-1
+//! ```
+//!
+//! Psi is never formed: it squares the condition. With `S = C C^T`, `W = C^-1 Delta` and `V = P H^T C^-T`, the
+//! columns of (W, T) are made orthonormal in W together, `W = Q R` and `T = U R`, so that `Psi = R^T R` and
+//!
+//! ```text
+//! L = (V + (U - V Q) Q^T) C^-1        P+ = P - V V^T + (U - V Q)(U - V Q)^T
+//! ```
+//!
+//! The columns come in blocks, one for each mismatch. Each block is first scaled to one in (Delta, T) together:
+//! an odometry column of one metre beside a frame column of a kilometre is no less a constraint. A block of no
+//! size says nothing and is dropped; a column that follows from others (the third axis of a rotation) too.
+//!
+//! A block with a finite sigma is a soft constraint: sigma^2 is the variance of its parameters, added to the
+//! model as `P H^T + sigma^2 T Delta^T` and `S + sigma^2 Delta Delta^T`. The limit of a large sigma is (22).
+//! Like the hard one it forgets: the parameters are drawn anew for each update. A state that remembers them is
+//! an [`Augmented`](crate::model::Augmented) one.
+
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
+
+use super::covariance::Covariance;
+use super::gain::Judgement;
+use super::linearised::Linearised;
+use super::update::UpdateError;
+use crate::lie::LieGroup;
+use crate::model::Columns;
+
+/// Most columns that a set of constraints holds.
+pub const MAX_COLUMNS: usize = 16;
+
+/// A block whose columns are all smaller than this (metres, radians) has no direction.
+const NO_SIZE: f64 = 1e-9;
+
+/// A column whose part outside the others is below this share of its block follows from them.
+const RANK_TOLERANCE: f64 = 1e-9;
+
+/// How well T of a dependent column must follow from the others, relative to the largest T.
+const CONSISTENCY_TOLERANCE: f64 = 1e-6;
+
+/// One parameter of a mismatch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Column<const D: usize, const M: usize> {
+    delta: SVector<f64, M>,
+    t: SVector<f64, D>,
+    sigma: f64,
+    /// Index of the first column of its block.
+    block: usize,
+}
+
+/// The columns of `L Delta = T`, on the stack.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constraints<const D: usize, const M: usize> {
+    columns: [Column<D, M>; MAX_COLUMNS],
+    count: usize,
+}
+
+impl<const D: usize, const M: usize> Default for Constraints<D, M> {
+    fn default() -> Self {
+        Self {
+            columns: [Column {
+                delta: SVector::zeros(),
+                t: SVector::zeros(),
+                sigma: 0.0,
+                block: 0,
+            }; MAX_COLUMNS],
+            count: 0,
+        }
+    }
+}
+
+/// (W, T) with W orthonormal; columns beyond the rank are zero.
+struct Basis<const D: usize, const M: usize> {
+    q: SMatrix<f64, M, M>,
+    u: SMatrix<f64, D, M>,
+    rank: usize,
+}
+
+/// `P H^T` and the factor of S with the soft constraints in them.
+struct Softened<const D: usize, const M: usize> {
+    p_ht: SMatrix<f64, D, M>,
+    innovation: Cholesky<f64, Const<M>>,
+}
+
+impl<const D: usize, const M: usize> Constraints<D, M> {
+    /// Adds the columns of one mismatch: `delta` (M rows) and `t` (D rows), as many of each. A sigma of
+    /// infinity makes the constraint hard.
+    ///
+    /// # Errors
+    /// [`UpdateError::TooManyConstraints`] beyond [`MAX_COLUMNS`]; nothing is added then.
+    pub fn push(
+        &mut self,
+        delta: &Columns<M>,
+        t: &Columns<D>,
+        sigma: f64,
+    ) -> Result<(), UpdateError> {
+        let added = delta.as_slice().iter().zip(t.as_slice());
+        if self.count + added.len() > MAX_COLUMNS {
+            return Err(UpdateError::TooManyConstraints);
+        }
+        let block = self.count;
+        for (delta, t) in added {
+            self.columns[self.count] = Column {
+                delta: *delta,
+                t: *t,
+                sigma,
+                block,
+            };
+            self.count += 1;
+        }
+        Ok(())
+    }
+
+    /// The columns of (Delta, T), as they were added.
+    pub fn columns(&self) -> impl Iterator<Item = (&SVector<f64, M>, &SVector<f64, D>)> {
+        self.all().iter().map(|column| (&column.delta, &column.t))
+    }
+
+    fn all(&self) -> &[Column<D, M>] {
+        &self.columns[..self.count]
+    }
+
+    fn soft(&self) -> impl Iterator<Item = &Column<D, M>> {
+        self.all().iter().filter(|column| column.sigma.is_finite())
+    }
+
+    fn softened<G: LieGroup<D>>(
+        &self,
+        linearised: &Linearised<G, D, M>,
+    ) -> Result<Softened<D, M>, UpdateError> {
+        let mut p_ht = linearised.p_ht;
+        let mut innovation = linearised.innovation;
+        if self.soft().next().is_some() {
+            let mut s = linearised.innovation_covariance();
+            for column in self.soft() {
+                let variance = column.sigma * column.sigma;
+                p_ht += column.t * column.delta.transpose() * variance;
+                s += column.delta * column.delta.transpose() * variance;
+            }
+            innovation = Cholesky::new(s).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
+        }
+        Ok(Softened { p_ht, innovation })
+    }
+
+    /// The hard columns, whitened by `factor` (C, lower), each block scaled to one.
+    fn scaled(
+        &self,
+        factor: &SMatrix<f64, M, M>,
+    ) -> Result<([Column<D, M>; MAX_COLUMNS], usize), UpdateError> {
+        let mut scaled = self.columns;
+        let mut count = 0;
+        let mut rest = self.all();
+        while let Some(first) = rest.first() {
+            let length = rest.iter().take_while(|c| c.block == first.block).count();
+            let (block, others) = rest.split_at(length);
+            rest = others;
+            let size = |part: &dyn Fn(&Column<D, M>) -> f64| {
+                block
+                    .iter()
+                    .map(part)
+                    .fold(0.0, |largest: f64, part| largest.max(part))
+            };
+            let in_delta = size(&|column| column.delta.norm());
+            let jointly = in_delta.hypot(size(&|column| column.t.norm()));
+            if first.sigma.is_finite() || jointly <= NO_SIZE {
+                continue;
+            }
+            if in_delta <= RANK_TOLERANCE * jointly {
+                return Err(UpdateError::UnsolvableConstraints);
+            }
+            let begin = count;
+            for column in block {
+                scaled[count] = *column;
+                factor.solve_lower_triangular_mut(&mut scaled[count].delta);
+                count += 1;
+            }
+            let whitened = &mut scaled[begin..count];
+            let largest = whitened.iter().map(|c| c.delta.norm()).fold(0.0, f64::max);
+            for column in whitened {
+                column.delta /= largest;
+                column.t /= largest;
+            }
+        }
+        Ok((scaled, count))
+    }
+
+    fn basis(&self, factor: &SMatrix<f64, M, M>) -> Result<Basis<D, M>, UpdateError> {
+        let (mut columns, count) = self.scaled(factor)?;
+        let columns = &mut columns[..count];
+        let largest_t = columns.iter().map(|c| c.t.norm()).fold(0.0, f64::max);
+        let mut basis = Basis {
+            q: SMatrix::zeros(),
+            u: SMatrix::zeros(),
+            rank: 0,
+        };
+        for done in 0..count {
+            let longest = (done..count).max_by(|a, b| {
+                columns[*a]
+                    .delta
+                    .norm()
+                    .total_cmp(&columns[*b].delta.norm())
+            });
+            columns.swap(done, longest.unwrap_or(done));
+            let length = columns[done].delta.norm();
+            if length <= RANK_TOLERANCE || basis.rank == M {
+                let unexplained = columns[done..].iter().map(|c| c.t.norm());
+                let unexplained = unexplained.fold(0.0, f64::max);
+                return if unexplained <= CONSISTENCY_TOLERANCE * largest_t {
+                    Ok(basis)
+                } else {
+                    Err(UpdateError::UnsolvableConstraints)
+                };
+            }
+            let (q, u) = (columns[done].delta / length, columns[done].t / length);
+            basis.q.set_column(basis.rank, &q);
+            basis.u.set_column(basis.rank, &u);
+            basis.rank += 1;
+            for column in &mut columns[done + 1..] {
+                // Against all of the basis, not the newest alone, and twice, which is enough.
+                for k in (0..basis.rank).chain(0..basis.rank) {
+                    let share = basis.q.column(k).dot(&column.delta);
+                    column.delta -= basis.q.column(k) * share;
+                    column.t -= basis.u.column(k) * share;
+                }
+            }
+        }
+        Ok(basis)
+    }
+
+    /// Whether a gain exists, and how many dimensions of the measurement the constraints take.
+    ///
+    /// # Errors
+    /// [`UpdateError::UnsolvableConstraints`].
+    pub fn rank(&self) -> Result<usize, UpdateError> {
+        Ok(self.basis(&SMatrix::identity())?.rank)
+    }
+
+    /// L, D x M.
+    ///
+    /// # Errors
+    /// [`UpdateError::UnsolvableConstraints`], or that S with the soft constraints is not positive definite.
+    pub fn gain<G: LieGroup<D>>(
+        &self,
+        linearised: &Linearised<G, D, M>,
+    ) -> Result<SMatrix<f64, D, M>, UpdateError> {
+        let softened = self.softened(linearised)?;
+        let factor = softened.innovation.l();
+        let basis = self.basis(&factor)?;
+        // C V^T = (P H^T)^T, then C^T L^T = (V + (U - V Q) Q^T)^T.
+        let mut transposed = softened.p_ht.transpose();
+        factor.solve_lower_triangular_mut(&mut transposed);
+        let v = transposed.transpose();
+        let mut gain = (v + (basis.u - v * basis.q) * basis.q.transpose()).transpose();
+        factor.tr_solve_lower_triangular_mut(&mut gain);
+        Ok(gain.transpose())
+    }
+
+    /// How surprising the part of the innovation is that the hard constraints leave.
+    ///
+    /// # Errors
+    /// As [`gain`](Self::gain).
+    pub fn judge<G: LieGroup<D>>(
+        &self,
+        linearised: &Linearised<G, D, M>,
+    ) -> Result<Judgement, UpdateError> {
+        let softened = self.softened(linearised)?;
+        let factor = softened.innovation.l();
+        let basis = self.basis(&factor)?;
+        let mut whitened = linearised.residual;
+        factor.solve_lower_triangular_mut(&mut whitened);
+        let left = whitened - basis.q * (basis.q.transpose() * whitened);
+        Ok(Judgement {
+            nis: left.norm_squared(),
+            degrees: M - basis.rank,
+        })
+    }
+
+    /// The covariance after a correction with `gain`: Joseph's form with what the soft constraints add,
+    /// `sigma^2 (T - L Delta)(T - L Delta)^T`. Hard constraints add nothing: there `L Delta = T`.
+    pub fn covariance<G: LieGroup<D>>(
+        &self,
+        prior: &Covariance<D>,
+        linearised: &Linearised<G, D, M>,
+        gain: &SMatrix<f64, D, M>,
+    ) -> Covariance<D> {
+        let corrected = prior.corrected(gain, &linearised.h, &linearised.noise);
+        self.soft().fold(corrected, |covariance, column| {
+            let left = (column.t - gain * column.delta) * column.sigma;
+            covariance.plus(&(left * left.transpose()))
+        })
+    }
+}

@@ -1,0 +1,152 @@
+//! How an innovation becomes a correction: the part of the update that tells the filters apart.
+//!
+//! | rule | filter |
+//! |---|---|
+//! | [`Kalman`] | InEKF (left, right), EKF ([`Additive`](super::Additive)), and their iterated forms |
+//! | [`Constrained`](super::Constrained) | LC-InEKF, LC-EKF, \[LC\] (22); with finite sigmas the soft constraint |
+//! | [`HInfinity`](super::HInfinity) | invariant extended H-infinity filter |
+//! | [`Consider`] | Schmidt's filter: some states are considered, not corrected |
+
+use nalgebra::{SMatrix, SVector};
+
+use super::covariance::Covariance;
+use super::linearised::Linearised;
+use super::update::UpdateError;
+use crate::lie::LieGroup;
+
+/// How surprising an innovation is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judgement {
+    /// Normalised innovation squared.
+    pub nis: f64,
+    /// Its degrees of freedom.
+    pub degrees: usize,
+}
+
+/// An iterate of Gauss-Newton: `xi` with its dual `eta = P^-1 xi`, which exists even where P is
+/// singular because every step lies in the range of P.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iterate<const D: usize> {
+    /// The correction, in the error of the belief's side.
+    pub xi: SVector<f64, D>,
+    /// Its dual; without meaning for rules that minimise no cost.
+    pub eta: SVector<f64, D>,
+}
+
+/// The gain of a filter.
+pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
+    /// Whether the rule is the minimiser of the Kalman cost, so that a step that raises it is shortened.
+    /// Others take every step as it is.
+    const MINIMISES_COST: bool = false;
+
+    /// How surprising the innovation is.
+    ///
+    /// # Errors
+    /// [`UpdateError`].
+    fn judge(&self, linearised: &Linearised<G, D, M>) -> Result<Judgement, UpdateError> {
+        Ok(Judgement {
+            nis: linearised.normalised_square(),
+            degrees: M,
+        })
+    }
+
+    /// The gain, D x M.
+    ///
+    /// # Errors
+    /// [`UpdateError`].
+    fn gain(
+        &self,
+        prior: &Covariance<D>,
+        linearised: &Linearised<G, D, M>,
+    ) -> Result<SMatrix<f64, D, M>, UpdateError>;
+
+    /// The next iterate, `gain * target` with `target = z_i + H_i xi_i`.
+    ///
+    /// # Errors
+    /// [`UpdateError`].
+    fn step(
+        &self,
+        prior: &Covariance<D>,
+        linearised: &Linearised<G, D, M>,
+        target: &SVector<f64, M>,
+    ) -> Result<Iterate<D>, UpdateError> {
+        Ok(Iterate {
+            xi: self.gain(prior, linearised)? * target,
+            eta: SVector::zeros(),
+        })
+    }
+
+    /// The covariance after a correction with `gain`: Joseph's form, unless the rule says more.
+    ///
+    /// # Errors
+    /// [`UpdateError`].
+    fn covariance(
+        &self,
+        prior: &Covariance<D>,
+        linearised: &Linearised<G, D, M>,
+        gain: &SMatrix<f64, D, M>,
+    ) -> Result<Covariance<D>, UpdateError> {
+        Ok(prior.corrected(gain, &linearised.h, &linearised.noise))
+    }
+}
+
+/// `K = P H^T S^-1`.
+pub(super) fn kalman_gain<G: LieGroup<D>, const D: usize, const M: usize>(
+    linearised: &Linearised<G, D, M>,
+) -> SMatrix<f64, D, M> {
+    // An M x M inverse is cheap, and the corrected covariance forgives a rounded gain.
+    linearised.p_ht * linearised.innovation.inverse()
+}
+
+/// The minimum of `xi^T P^-1 xi + z^T N^-1 z`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Kalman;
+
+impl<G: LieGroup<D>, const D: usize, const M: usize> GainRule<G, D, M> for Kalman {
+    const MINIMISES_COST: bool = true;
+
+    fn gain(
+        &self,
+        _prior: &Covariance<D>,
+        linearised: &Linearised<G, D, M>,
+    ) -> Result<SMatrix<f64, D, M>, UpdateError> {
+        Ok(kalman_gain(linearised))
+    }
+
+    fn step(
+        &self,
+        _prior: &Covariance<D>,
+        linearised: &Linearised<G, D, M>,
+        target: &SVector<f64, M>,
+    ) -> Result<Iterate<D>, UpdateError> {
+        let lambda = linearised.innovation.solve(target);
+        Ok(Iterate {
+            xi: linearised.p_ht * lambda,
+            eta: linearised.h.transpose() * lambda,
+        })
+    }
+}
+
+/// Schmidt's rule: the states from `first` on are not corrected, but their uncertainty counts.
+///
+/// On an [`Augmented`](crate::model::Augmented) state with `first` the dimension of the pose, the mismatches
+/// are considered: they widen S and P and never move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Consider {
+    /// Index of the first state that is considered.
+    pub first: usize,
+}
+
+impl<G: LieGroup<D>, const D: usize, const M: usize> GainRule<G, D, M> for Consider {
+    fn gain(
+        &self,
+        _prior: &Covariance<D>,
+        linearised: &Linearised<G, D, M>,
+    ) -> Result<SMatrix<f64, D, M>, UpdateError> {
+        let mut gain = kalman_gain(linearised);
+        for row in self.first..D {
+            gain.row_mut(row).fill(0.0);
+        }
+        Ok(gain)
+    }
+}

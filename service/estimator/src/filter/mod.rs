@@ -1,0 +1,51 @@
+//! Beliefs on Lie groups, and what happens to them.
+//!
+//! [`Belief`] is a concentrated Gaussian in the left- or right-invariant error ([`side`]), or in the
+//! additive one of the EKF ([`additive`]); [`mod@propagate`] moves it with the IMU or with odometry,
+//! [`mod@update`] corrects it with an observation: one core for every sensor, group, side and filter. What
+//! tells the filters apart is the side and the rule of the gain ([`gain`]): Kalman's, the linearly
+//! constrained one ([`constrained`], on the algebra of [`constraint`]), H-infinity ([`hinf`]), Schmidt's.
+//! [`adaptive`] runs several filters at once where the behaviour of a mismatch is itself unknown,
+//! [`gate`] judges innovations, [`alignment`] makes the first belief.
+//!
+//! | filter | state | side | rule |
+//! |---|---|---|---|
+//! | InEKF | G | [`Left`], [`Right`] | [`Kalman`] |
+//! | EKF | G | [`Additive`] | [`Kalman`] |
+//! | LC-InEKF, LC-EKF | G | [`Left`], [`Right`]; [`Additive`] | [`Constrained`], [`hard`](crate::model::Declared::hard) |
+//! | soft constraints | G | any | [`Constrained`], [`soft`](crate::model::Declared::soft) |
+//! | invariant extended H-infinity | G | [`Left`] | [`HInfinity`] |
+//! | considered mismatches (Schmidt) | [`Augmented`](crate::model::Augmented) | any | [`Consider`] |
+//! | learned mismatches | [`Augmented`](crate::model::Augmented) | any | [`Kalman`] |
+//! | mismatches of unknown behaviour | [`Augmented`](crate::model::Augmented), several | [`Left`] | [`Adaptive`] over [`Kalman`] |
+//!
+//! Iterated and with transport, or plain, is a matter of [`UpdateOptions`] for all of them.
+
+pub mod adaptive;
+pub mod additive;
+pub mod alignment;
+pub mod belief;
+pub mod constrained;
+pub mod constraint;
+pub mod covariance;
+pub mod gain;
+pub mod gate;
+pub mod hinf;
+pub mod linearised;
+pub mod propagate;
+pub mod side;
+pub mod update;
+
+pub use adaptive::{Adaptive, Expected, Mode, STANDARD_MODES, Switching, standard_modes};
+pub use additive::Additive;
+pub use alignment::{Alignment, BiasPrior, Levelled};
+pub use belief::Belief;
+pub use constrained::Constrained;
+pub use constraint::Constraints;
+pub use covariance::Covariance;
+pub use gain::{Consider, GainRule, Judgement, Kalman};
+pub use hinf::{HInfinity, HInfinityGain};
+pub use linearised::Linearised;
+pub use propagate::{propagate, propagate_augmented, propagate_odometry};
+pub use side::{Left, Right, Side};
+pub use update::{Correction, Transport, UpdateError, UpdateOptions, Verdict, update, update_with};

@@ -1,0 +1,94 @@
+//! Left or right invariance, as types.
+//!
+//! | | [`Left`] | [`Right`] |
+//! |---|---|---|
+//! | error | `chi = chi_hat exp(xi)`, body coordinates | `chi = exp(xi) chi_hat`, world coordinates |
+//! | transport after a correction | right Jacobian | left Jacobian |
+//!
+//! The two are one filter with two costs (\[PAR\], Propositions 1 and 2): `xi_right =
+//! Ad_{chi_hat} xi_left`, and they agree as long as the covariance is carried along at updates.
+
+use core::fmt::Debug;
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::lie::LieGroup;
+
+/// Which side of the estimate the error sits on.
+pub trait Side: Copy + Clone + Debug + PartialEq {
+    /// The group element that lies `xi` away from `chi`.
+    fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G;
+
+    /// The `xi` with `retract(chi_hat, xi) = chi`.
+    fn difference<G: LieGroup<D>, const D: usize>(chi_hat: &G, chi: &G) -> SVector<f64, D>;
+
+    /// J with `retract(chi, xi + d) = retract(retract(chi, xi), J d)` to first order: it carries
+    /// an error written around `chi` to the point `xi` away from it.
+    fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D>;
+
+    /// A, with `xi_side = A xi_left` at `chi`.
+    fn from_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D>;
+
+    /// `A^-1`, with `xi_left = A^-1 xi_side` at `chi`.
+    fn to_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D>;
+
+    /// Whether the error is the left-invariant one already, so that changes of coordinates can
+    /// be left out.
+    const IS_LEFT: bool;
+}
+
+/// `chi = chi_hat exp(xi)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Left;
+
+/// `chi = exp(xi) chi_hat`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Right;
+
+impl Side for Left {
+    fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
+        chi.compose(&G::exp(xi))
+    }
+
+    fn difference<G: LieGroup<D>, const D: usize>(chi_hat: &G, chi: &G) -> SVector<f64, D> {
+        chi_hat.inverse().compose(chi).log()
+    }
+
+    fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        G::right_jacobian(xi)
+    }
+
+    fn from_left<G: LieGroup<D>, const D: usize>(_chi: &G) -> SMatrix<f64, D, D> {
+        SMatrix::identity()
+    }
+
+    fn to_left<G: LieGroup<D>, const D: usize>(_chi: &G) -> SMatrix<f64, D, D> {
+        SMatrix::identity()
+    }
+
+    const IS_LEFT: bool = true;
+}
+
+impl Side for Right {
+    fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
+        G::exp(xi).compose(chi)
+    }
+
+    fn difference<G: LieGroup<D>, const D: usize>(chi_hat: &G, chi: &G) -> SVector<f64, D> {
+        chi.compose(&chi_hat.inverse()).log()
+    }
+
+    fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        G::left_jacobian(xi)
+    }
+
+    fn from_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D> {
+        chi.adjoint()
+    }
+
+    fn to_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D> {
+        chi.inverse().adjoint()
+    }
+
+    const IS_LEFT: bool = false;
+}

@@ -1,0 +1,303 @@
+//! The one update core: an iterated, gated Kalman update on a Lie group.
+//!
+//! Gauss-Newton on `xi^T P^-1 xi + z(chi)^T N^-1 z(chi)`, `chi = retract(chi_hat, xi)`, with the
+//! prior frozen at `chi_hat` (\[PAR\], Corollary 1). At the iterate `xi_i` the observation is
+//! linearised as `H_i = H(chi_i) J(xi_i)`, J the right (left error) or left (right error) Jacobian
+//! of the group, and
+//!
+//! ```text
+//! xi_{i+1} = P H_i^T (H_i P H_i^T + N)^-1 (z_i + H_i xi_i)
+//! ```
+//!
+//! Only the innovation covariance is inverted, so P may be singular. A step that would raise the
+//! cost is shortened; if no share of it lowers the cost, the iteration is at its end. After it the
+//! covariance is carried to the new estimate by J(xi) (\[PAR\], Proposition 2): without that, a
+//! precise fix on a wrong heading breaks the filter.
+//! `iterations = 1` with [`Transport::None`] is the plain filter of the papers.
+
+use core::fmt;
+
+use nalgebra::{Cholesky, SVector};
+
+use super::belief::Belief;
+use super::gain::{GainRule, Iterate, Judgement, Kalman};
+use super::linearised::Linearised;
+use super::side::Side;
+use crate::lie::LieGroup;
+use crate::model::Observation;
+
+/// What happens to the covariance when the estimate moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// Carried to the new linearisation point by the Jacobian of the correction.
+    Jacobian,
+    /// Left as it is, as in the papers' plain filters.
+    None,
+}
+
+/// How an update is done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UpdateOptions {
+    /// Most Gauss-Newton iterations; 1 is the plain Kalman update.
+    pub iterations: usize,
+    /// Iterating stops when no component of the step exceeds this many of its own prior standard
+    /// deviations.
+    pub tolerance: f64,
+    /// What happens to the covariance.
+    pub transport: Transport,
+    /// An innovation with a larger normalised square than this is refused; infinity accepts all.
+    pub gate: f64,
+}
+
+impl UpdateOptions {
+    /// The plain filter of the papers: one pass, no transport, no gate.
+    pub const PLAIN: Self = Self {
+        iterations: 1,
+        tolerance: 0.0,
+        transport: Transport::None,
+        gate: f64::INFINITY,
+    };
+
+    /// The default of this library: iterated, with transport.
+    pub const ITERATED: Self = Self {
+        iterations: 10,
+        tolerance: 1e-6,
+        transport: Transport::Jacobian,
+        gate: f64::INFINITY,
+    };
+}
+
+/// Whether an observation was used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The belief was corrected.
+    Accepted,
+    /// The innovation was beyond the gate; the belief is unchanged.
+    Gated,
+}
+
+/// What an update did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correction<const D: usize> {
+    /// Whether the observation was used.
+    pub verdict: Verdict,
+    /// Normalised innovation squared, `z^T S^-1 z` at the prior (of what hard constraints leave of z);
+    /// chi-square with `degrees` degrees of freedom where the filter is consistent.
+    pub nis: f64,
+    /// Degrees of freedom of the innovation: M, less what hard constraints take.
+    pub degrees: usize,
+    /// `ln det S` at the prior: with `nis`, the likelihood of the innovation up to a constant.
+    pub log_determinant: f64,
+    /// The correction in the error of the belief's side; zero if gated.
+    pub xi: SVector<f64, D>,
+    /// Gauss-Newton iterations done.
+    pub iterations: usize,
+}
+
+/// Why an update could not be computed; the belief is unchanged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum UpdateError {
+    /// The innovation covariance is not positive definite: a noise that is not, or a broken P.
+    InnovationNotPositiveDefinite,
+    /// The result is not finite.
+    NotFinite,
+    /// No gain satisfies the hard constraints.
+    UnsolvableConstraints,
+    /// More mismatches are declared than a set of constraints holds.
+    TooManyConstraints,
+    /// A mismatch names a source that is not there.
+    NoSuchSource {
+        /// Index that was named.
+        source: usize,
+        /// How many sources there are.
+        sources: usize,
+    },
+    /// The H-infinity filter does not exist for this gamma.
+    InfeasibleGamma {
+        /// gamma must be below this, the inverse of the largest variance after the update.
+        bound: f64,
+    },
+}
+
+impl fmt::Display for UpdateError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::InnovationNotPositiveDefinite => {
+                "the innovation covariance is not positive definite: check the measurement's \
+                 covariance"
+            }
+            Self::NotFinite => "the corrected state is not finite: check the measurement",
+            Self::UnsolvableConstraints => {
+                "no gain satisfies the declared mismatches: the measurement has not enough independent \
+                 outputs for them; declare fewer, add a position source, or give some a sigma"
+            }
+            Self::TooManyConstraints => {
+                "more mismatches are declared than an update can hold: declare fewer"
+            }
+            Self::NoSuchSource { source, sources } => {
+                return write!(
+                    formatter,
+                    "a mismatch names position source {source}, and there are {sources}: count from 0"
+                );
+            }
+            Self::InfeasibleGamma { bound } => {
+                return write!(
+                    formatter,
+                    "gamma is infeasible for the H-infinity filter: it must be below {bound}, the inverse \
+                     of the largest variance after this update"
+                );
+            }
+        })
+    }
+}
+
+impl core::error::Error for UpdateError {}
+
+impl<const D: usize> Iterate<D> {
+    /// The point at `fraction` of the way to `other`.
+    fn towards(&self, other: &Self, fraction: f64) -> Self {
+        Self {
+            xi: self.xi * (1.0 - fraction) + other.xi * fraction,
+            eta: self.eta * (1.0 - fraction) + other.eta * fraction,
+        }
+    }
+}
+
+/// How much larger a cost may come out by rounding alone. Without it the iteration would end where the cost
+/// is flat to rounding, a hundred-millionth of a standard deviation from the minimum.
+const COST_ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// How many shares of a Gauss-Newton step are tried, each half of the one before.
+const MAX_TRIALS: usize = 11;
+
+/// Corrects `belief` with `observation`, by the Kalman gain.
+///
+/// # Errors
+/// [`UpdateError`]; the belief is then unchanged, as it is when the observation is gated.
+pub fn update<G, S, O, const D: usize, const M: usize>(
+    belief: &mut Belief<G, S, D>,
+    observation: &O,
+    options: &UpdateOptions,
+) -> Result<Correction<D>, UpdateError>
+where
+    G: LieGroup<D>,
+    S: Side,
+    O: Observation<G, D, M>,
+{
+    update_with(belief, observation, &Kalman, options)
+}
+
+/// Corrects `belief` with `observation`, by the gain of `rule`.
+///
+/// # Errors
+/// [`UpdateError`]; the belief is then unchanged, as it is when the observation is gated.
+pub fn update_with<G, S, O, L, const D: usize, const M: usize>(
+    belief: &mut Belief<G, S, D>,
+    observation: &O,
+    rule: &L,
+    options: &UpdateOptions,
+) -> Result<Correction<D>, UpdateError>
+where
+    G: LieGroup<D>,
+    S: Side,
+    O: Observation<G, D, M>,
+    L: GainRule<G, D, M>,
+{
+    let noise = observation.noise();
+    let noise_factor = Cholesky::new(noise).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
+    let cost = |iterate: &Iterate<D>, chi: &G| {
+        let z = observation.residual(chi);
+        iterate.xi.dot(&iterate.eta) + z.dot(&noise_factor.solve(&z))
+    };
+
+    let mut current = Iterate {
+        xi: SVector::zeros(),
+        eta: SVector::zeros(),
+    };
+    let mut chi = belief.mean;
+    let mut linearised = Linearised::at(belief, observation, &chi, &current.xi, &noise)
+        .ok_or(UpdateError::InnovationNotPositiveDefinite)?;
+    let Judgement { nis, degrees } = rule.judge(&linearised)?;
+    if !nis.is_finite() {
+        return Err(UpdateError::NotFinite);
+    }
+    let log_determinant = linearised.log_determinant();
+    if nis > options.gate {
+        return Ok(Correction {
+            verdict: Verdict::Gated,
+            nis,
+            degrees,
+            log_determinant,
+            xi: SVector::zeros(),
+            iterations: 0,
+        });
+    }
+
+    let mut iterations = 0;
+    loop {
+        let target = linearised.residual + linearised.h * current.xi;
+        let full = rule.step(&belief.covariance, &linearised, &target)?;
+        iterations += 1;
+        let at = |fraction: f64| {
+            let iterate = current.towards(&full, fraction);
+            (iterate, S::retract(&belief.mean, &iterate.xi))
+        };
+        let (next, next_chi) = if options.iterations == 1 || !L::MINIMISES_COST {
+            at(1.0)
+        } else {
+            let before = cost(&current, &chi) * (1.0 + COST_ROUNDING);
+            let shares = core::iter::successors(Some(1.0), |share| Some(0.5 * share));
+            let lower = shares
+                .take(MAX_TRIALS)
+                .map(at)
+                .find(|(iterate, chi)| cost(iterate, chi) <= before);
+            match lower {
+                Some(lower) => lower,
+                // At the minimum, as far as rounding lets it be told.
+                None if at(1.0).1.is_finite() => break,
+                None => return Err(UpdateError::NotFinite),
+            }
+        };
+        let step = next.xi - current.xi;
+        current = next;
+        chi = next_chi;
+        if iterations >= options.iterations || is_small(&step, belief, options.tolerance) {
+            break;
+        }
+        linearised = Linearised::at(belief, observation, &chi, &current.xi, &noise)
+            .ok_or(UpdateError::InnovationNotPositiveDefinite)?;
+    }
+
+    let gain = rule.gain(&belief.covariance, &linearised)?;
+    let mut covariance = rule.covariance(&belief.covariance, &linearised, &gain)?;
+    if options.transport == Transport::Jacobian {
+        covariance = covariance.transformed(&S::jacobian::<G, D>(&current.xi));
+    }
+    let corrected = Belief::new(chi.normalized(), covariance);
+    if !corrected.is_plausible() {
+        return Err(UpdateError::NotFinite);
+    }
+    *belief = corrected;
+    Ok(Correction {
+        verdict: Verdict::Accepted,
+        nis,
+        degrees,
+        log_determinant,
+        xi: current.xi,
+        iterations,
+    })
+}
+
+/// Whether `step` is below `tolerance` standard deviations of the prior in every component.
+fn is_small<G: LieGroup<D>, S: Side, const D: usize>(
+    step: &SVector<f64, D>,
+    belief: &Belief<G, S, D>,
+    tolerance: f64,
+) -> bool {
+    let variances = belief.covariance.matrix().diagonal();
+    step.iter()
+        .zip(variances.iter())
+        .all(|(component, variance)| {
+            component * component <= tolerance * tolerance * variance.max(0.0)
+        })
+}

@@ -1,0 +1,255 @@
+//! SO(3): rotations in space.
+//!
+//! Stored as a unit Hamilton quaternion `x, y, z, w`, body to world: `rotate` takes body coordinates to
+//! world coordinates. Tangent: the rotation vector, radians. Closed forms: Sola, Deray and Atchuthan,
+//! *A micro Lie theory for state estimation in robotics*, on the half angle so that neither 0 nor pi is special.
+
+use nalgebra::{Matrix3, Matrix4, SymmetricEigen, Vector3};
+
+use super::series::{RotationSeries, cos_sinc, inverse_jacobian_coefficient};
+use super::{LieGroup, RotationError, multiply_by_composing};
+
+/// How far a matrix may be from its nearest rotation, in its worst entry, to be taken for one.
+const MATRIX_TOLERANCE: f64 = 0.1;
+
+/// The skew matrix of a vector: `hat(a) b = a x b`.
+#[must_use]
+pub fn hat(a: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
+}
+
+/// The rotation that takes body coordinates to world coordinates.
+///
+/// Two rotations are equal when their stored numbers are, up to the common sign of the quaternion.
+#[derive(Debug, Clone, Copy)]
+pub struct SO3 {
+    /// The vector part `x, y, z`: the axis times the sine of half the angle.
+    vector: Vector3<f64>,
+    /// The scalar part: the cosine of half the angle.
+    w: f64,
+}
+
+impl SO3 {
+    /// Takes a quaternion `x, y, z, w` (Hamilton, body to world) of any norm and normalises it.
+    ///
+    /// # Errors
+    /// If an entry is not finite, or the norm is zero, or its square under- or overflows.
+    pub fn from_quaternion_xyzw(xyzw: [f64; 4]) -> Result<Self, RotationError> {
+        let [x, y, z, w] = xyzw;
+        if !xyzw.iter().all(|entry| entry.is_finite()) {
+            return Err(RotationError::NotFinite);
+        }
+        let vector = Vector3::new(x, y, z);
+        let norm_squared = vector.norm_squared() + w * w;
+        if !norm_squared.is_normal() {
+            return Err(RotationError::NoDirection);
+        }
+        Ok(Self { vector, w }.normalized())
+    }
+
+    /// The unit quaternion `x, y, z, w` (Hamilton, body to world); its sign carries no meaning.
+    #[must_use]
+    pub fn quaternion_xyzw(&self) -> [f64; 4] {
+        [self.vector.x, self.vector.y, self.vector.z, self.w]
+    }
+
+    /// The rotation nearest to a matrix (Frobenius norm), body to world: `x_w = matrix x_b`.
+    ///
+    /// The quaternion is the eigenvector of Davenport's matrix, as good near pi as anywhere.
+    ///
+    /// # Errors
+    /// If an entry is not finite, or if some entry is more than 0.1 away from the nearest rotation: a
+    /// reflection, a matrix with a scale, or not a rotation at all.
+    pub fn from_matrix(matrix: &Matrix3<f64>) -> Result<Self, RotationError> {
+        if !matrix.iter().all(|entry| entry.is_finite()) {
+            return Err(RotationError::NotFinite);
+        }
+        // No rotation has a larger entry than 1: refused before a product can overflow.
+        if matrix.amax() > 1.0 + MATRIX_TOLERANCE {
+            return Err(RotationError::NotARotation);
+        }
+        let m = |i, j| matrix[(i, j)];
+        #[rustfmt::skip]
+        let davenport = Matrix4::new(
+            m(0, 0) - m(1, 1) - m(2, 2), m(0, 1) + m(1, 0), m(0, 2) + m(2, 0), m(2, 1) - m(1, 2),
+            m(0, 1) + m(1, 0), m(1, 1) - m(0, 0) - m(2, 2), m(1, 2) + m(2, 1), m(0, 2) - m(2, 0),
+            m(0, 2) + m(2, 0), m(1, 2) + m(2, 1), m(2, 2) - m(0, 0) - m(1, 1), m(1, 0) - m(0, 1),
+            m(2, 1) - m(1, 2), m(0, 2) - m(2, 0), m(1, 0) - m(0, 1), m(0, 0) + m(1, 1) + m(2, 2),
+        );
+        let eigen = SymmetricEigen::new(davenport);
+        let q = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+        let rotation = Self::from_quaternion_xyzw([q[0], q[1], q[2], q[3]])?;
+        if (rotation.matrix() - matrix).amax() > MATRIX_TOLERANCE {
+            return Err(RotationError::NotARotation);
+        }
+        Ok(rotation)
+    }
+
+    /// `Rz(heading) Ry(pitch) Rx(roll)`, all in radians, with x forward, y left, z up (FLU) in the body
+    /// and east, north, up (ENU) in the world.
+    ///
+    /// Heading counts counter-clockwise from east; a positive pitch puts the nose down and a positive roll
+    /// puts the left side up.
+    #[must_use]
+    pub fn from_roll_pitch_heading(roll_rad: f64, pitch_rad: f64, heading_rad: f64) -> Self {
+        let turn = |axis: Vector3<f64>, angle_rad: f64| {
+            let (sin, cos) = (0.5 * angle_rad).sin_cos();
+            Self {
+                vector: axis * sin,
+                w: cos,
+            }
+        };
+        turn(Vector3::z(), heading_rad)
+            * turn(Vector3::y(), pitch_rad)
+            * turn(Vector3::x(), roll_rad)
+    }
+
+    /// The heading in radians, in `[-pi, pi]`: the direction of the body's x axis on the ground,
+    /// counter-clockwise from the world's x axis. It is meaningless where x points straight up or down.
+    #[must_use]
+    pub fn heading_rad(&self) -> f64 {
+        let [x, y, z, w] = self.quaternion_xyzw();
+        f64::atan2(2.0 * (x * y + w * z), w * w + x * x - y * y - z * z)
+    }
+
+    /// The rotation matrix, body to world: its columns are the body's axes in world coordinates.
+    #[must_use]
+    pub fn matrix(&self) -> Matrix3<f64> {
+        let [x, y, z, w] = self.quaternion_xyzw();
+        let (x2, y2, z2) = (x + x, y + y, z + z);
+        let (xx, yy, zz) = (x * x2, y * y2, z * z2);
+        let (xy, xz, yz) = (x * y2, x * z2, y * z2);
+        let (wx, wy, wz) = (w * x2, w * y2, w * z2);
+        #[rustfmt::skip]
+        let matrix = Matrix3::new(
+            1.0 - (yy + zz), xy - wz, xz + wy,
+            xy + wz, 1.0 - (xx + zz), yz - wx,
+            xz - wy, yz + wx, 1.0 - (xx + yy),
+        );
+        matrix
+    }
+
+    /// Takes a vector from body to world coordinates, `R a`.
+    #[must_use]
+    pub fn rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
+        let twice = 2.0 * self.vector.cross(a);
+        a + self.w * twice + self.vector.cross(&twice)
+    }
+
+    /// Takes a vector from world to body coordinates, `R^T a`.
+    #[must_use]
+    pub fn inverse_rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
+        let twice = 2.0 * self.vector.cross(a);
+        a - self.w * twice + self.vector.cross(&twice)
+    }
+}
+
+/// `Jl(phi)^-1 a_i` on SO(3), without forming the matrix.
+pub(super) fn left_jacobian_inverse_times<const K: usize>(
+    phi: &Vector3<f64>,
+    vectors: &[Vector3<f64>; K],
+) -> [Vector3<f64>; K] {
+    let c = inverse_jacobian_coefficient(phi.norm_squared());
+    vectors.map(|a| {
+        let phi_a = phi.cross(&a);
+        a - 0.5 * phi_a + c * phi.cross(&phi_a)
+    })
+}
+
+impl PartialEq for SO3 {
+    fn eq(&self, other: &Self) -> bool {
+        (self.vector == other.vector && self.w == other.w)
+            || (self.vector == -other.vector && self.w == -other.w)
+    }
+}
+
+impl LieGroup<3> for SO3 {
+    const ROTATION_DIM: usize = 3;
+
+    fn identity() -> Self {
+        Self {
+            vector: Vector3::zeros(),
+            w: 1.0,
+        }
+    }
+
+    fn exp(phi: &Vector3<f64>) -> Self {
+        let (cos, sinc) = cos_sinc(0.25 * phi.norm_squared());
+        Self {
+            vector: (0.5 * sinc) * phi,
+            w: cos,
+        }
+    }
+
+    fn log(&self) -> Vector3<f64> {
+        // Of the two quaternions, the one whose half angle is at most pi/2.
+        let (vector, w) = if self.w < 0.0 {
+            (-self.vector, -self.w)
+        } else {
+            (self.vector, self.w)
+        };
+        let sin_squared = vector.norm_squared();
+        // Below, atan2(s, w) = s/w to double precision, and s^2 may underflow.
+        if sin_squared < 1e-20 {
+            return (2.0 / w) * vector;
+        }
+        let sin = sin_squared.sqrt();
+        (2.0 * sin.atan2(w) / sin) * vector
+    }
+
+    fn compose(&self, other: &Self) -> Self {
+        let vector =
+            self.w * other.vector + other.w * self.vector + self.vector.cross(&other.vector);
+        let w = self.w * other.w - self.vector.dot(&other.vector);
+        // One Newton step for 1 / norm: rounding cannot build up over any number of products.
+        let scale = 1.5 - 0.5 * (vector.norm_squared() + w * w);
+        Self {
+            vector: scale * vector,
+            w: scale * w,
+        }
+    }
+
+    fn inverse(&self) -> Self {
+        Self {
+            vector: -self.vector,
+            w: self.w,
+        }
+    }
+
+    fn adjoint(&self) -> Matrix3<f64> {
+        self.matrix()
+    }
+
+    fn ad(phi: &Vector3<f64>) -> Matrix3<f64> {
+        hat(phi)
+    }
+
+    fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
+        RotationSeries::at(phi).gamma::<1>()
+    }
+
+    fn left_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
+        let t = phi.norm_squared();
+        let c = inverse_jacobian_coefficient(t);
+        let mut inverse = (c * phi) * phi.transpose() - hat(&(0.5 * phi));
+        let diagonal = 1.0 - c * t;
+        inverse[(0, 0)] += diagonal;
+        inverse[(1, 1)] += diagonal;
+        inverse[(2, 2)] += diagonal;
+        inverse
+    }
+
+    fn is_finite(&self) -> bool {
+        self.w.is_finite() && self.vector.iter().all(|entry| entry.is_finite())
+    }
+
+    fn normalized(&self) -> Self {
+        let scale = 1.0 / (self.vector.norm_squared() + self.w * self.w).sqrt();
+        Self {
+            vector: scale * self.vector,
+            w: scale * self.w,
+        }
+    }
+}
+
+multiply_by_composing!(SO3);

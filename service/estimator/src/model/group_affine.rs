@@ -1,0 +1,85 @@
+//! Group-affine dynamics, `chi+ = W * phi(chi) * U` with `phi` an automorphism of the group:
+//! \[IS\] (6), where W is called Gamma and U Upsilon.
+//!
+//! For such a step the error propagates exactly and without knowing the state (\[IS\] (7)):
+//! `xi+ = F xi`, with `F = Ad_{U^-1} M` in the left-invariant error and `F = Ad_W M` in the
+//! right-invariant one; M is the differential of `phi` at the identity.
+
+use core::marker::PhantomData;
+
+use nalgebra::SMatrix;
+
+use crate::lie::{LieGroup, SE23};
+
+/// A bijective map of the group onto itself with `phi(a b) = phi(a) phi(b)`.
+pub trait Automorphism<G: LieGroup<D>, const D: usize> {
+    /// `phi(chi)`.
+    fn apply(&self, chi: &G) -> G;
+    /// M, D x D, with `phi(chi exp(xi)) = phi(chi) exp(M xi)` (\[IS\] (3)).
+    fn differential(&self) -> SMatrix<f64, D, D>;
+}
+
+/// Motion without force for `dt_s` seconds on SE_2(3): the position advances by `v_w * dt_s`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FreeMotion {
+    /// Duration of the step, s.
+    pub dt_s: f64,
+}
+
+impl Automorphism<SE23, 9> for FreeMotion {
+    fn apply(&self, chi: &SE23) -> SE23 {
+        SE23 {
+            position: chi.position + chi.velocity * self.dt_s,
+            ..*chi
+        }
+    }
+
+    fn differential(&self) -> SMatrix<f64, 9, 9> {
+        let mut m = SMatrix::<f64, 9, 9>::identity();
+        for axis in 0..3 {
+            m[(6 + axis, 3 + axis)] = self.dt_s;
+        }
+        m
+    }
+}
+
+/// One step `chi+ = W * phi(chi) * U`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroupAffineStep<G, A, const D: usize> {
+    /// W (Gamma in \[IS\]): acts from the world side, e.g. gravity.
+    pub world: G,
+    /// phi.
+    pub automorphism: A,
+    /// U (Upsilon in \[IS\]): acts from the body side, e.g. what the IMU measured.
+    pub body: G,
+    dimension: PhantomData<[(); D]>,
+}
+
+impl<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize> GroupAffineStep<G, A, D> {
+    /// The step with the given parts.
+    pub fn new(world: G, automorphism: A, body: G) -> Self {
+        Self {
+            world,
+            automorphism,
+            body,
+            dimension: PhantomData,
+        }
+    }
+
+    /// `W * phi(chi) * U`.
+    pub fn apply(&self, chi: &G) -> G {
+        self.world
+            .compose(&self.automorphism.apply(chi))
+            .compose(&self.body)
+    }
+
+    /// F, D x D, of the left-invariant error: `Ad_{U^-1} M` (\[IS\], Proposition 1).
+    pub fn left_jacobian(&self) -> SMatrix<f64, D, D> {
+        self.body.inverse().adjoint() * self.automorphism.differential()
+    }
+
+    /// F, D x D, of the right-invariant error: `Ad_W M`.
+    pub fn right_jacobian(&self) -> SMatrix<f64, D, D> {
+        self.world.adjoint() * self.automorphism.differential()
+    }
+}

@@ -1,0 +1,163 @@
+//! One IMU sample as a group-affine step on SE_2(3), with its noise.
+//!
+//! Body frame FLU, world frame ENU. The accelerometer measures specific force: at rest it reads
+//! `-R^T g_w`, +9.81 on z. Tangent order rotation, velocity, position; left-invariant noise.
+//!
+//! With `phi = omega dt`, `zoh` (rates constant over the interval) is exact:
+//! `U = (Exp(phi), Gamma_1(phi) a dt, Gamma_2(phi) a dt^2)`, `W = (I, g dt, g dt^2 / 2)`.
+//! `euler` is the scheme printed in \[IS\] (17)-(18): `U = (Exp(phi), a dt, 0)`, `W = (I, g dt, 0)`,
+//! which lacks `(R a + g) dt^2 / 2` in the position.
+
+use nalgebra::{SMatrix, Vector3};
+
+use super::group_affine::{FreeMotion, GroupAffineStep};
+use crate::lie::series::RotationSeries;
+use crate::lie::{LieGroup, SE23, SO3};
+
+/// How an interval with constant rates becomes a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Discretisation {
+    /// Exact for angular rate and specific force constant over the interval.
+    ZeroOrderHold,
+    /// The scheme of \[IS\] (17)-(18), kept to reproduce the paper.
+    Euler,
+}
+
+/// Angular rate and specific force of the body over one interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuInput {
+    /// Angular rate in the body frame, rad/s.
+    pub omega_b: Vector3<f64>,
+    /// Specific force in the body frame, m/s^2.
+    pub force_b: Vector3<f64>,
+}
+
+impl ImuInput {
+    /// The mean of two inputs.
+    pub fn midpoint(&self, other: &Self) -> Self {
+        Self {
+            omega_b: 0.5 * (self.omega_b + other.omega_b),
+            force_b: 0.5 * (self.force_b + other.force_b),
+        }
+    }
+}
+
+/// Power spectral densities of the white noises that drive the error.
+///
+/// A discrete standard deviation `sigma` per sample of length `dt` is the density `sigma^2 dt`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuNoise {
+    /// Gyroscope, (rad/s)^2/Hz.
+    pub gyro_psd: f64,
+    /// Accelerometer, (m/s^2)^2/Hz.
+    pub accel_psd: f64,
+    /// Gyroscope bias random walk, (rad/s^2)^2/Hz.
+    pub gyro_bias_psd: f64,
+    /// Accelerometer bias random walk, (m/s^3)^2/Hz.
+    pub accel_bias_psd: f64,
+}
+
+/// One interval: the group-affine step, and how a disturbance of the input enters it.
+#[derive(Clone, Copy, Debug)]
+pub struct ImuStep {
+    /// `chi+ = W phi(chi) U`.
+    pub step: GroupAffineStep<SE23, FreeMotion, 9>,
+    /// B, 9 x 6, with `U(u + d) = U(u) exp(B d)` to first order, d = (rate, force).
+    pub input_jacobian: SMatrix<f64, 9, 6>,
+    /// Length of the interval, s.
+    pub dt_s: f64,
+}
+
+impl ImuStep {
+    /// The step over `dt_s` seconds with the bias-free `input` under gravity `g_w`, m/s^2.
+    pub fn new(
+        input: &ImuInput,
+        g_w: &Vector3<f64>,
+        dt_s: f64,
+        discretisation: Discretisation,
+    ) -> Self {
+        let phi = input.omega_b * dt_s;
+        let rotation = SO3::exp(&phi);
+        let back = rotation.inverse().matrix();
+        let mut input_jacobian = SMatrix::<f64, 9, 6>::zeros();
+        let rotation_block = SO3::right_jacobian(&phi) * dt_s;
+        input_jacobian
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&rotation_block);
+
+        let (world, body) = match discretisation {
+            Discretisation::Euler => {
+                input_jacobian
+                    .fixed_view_mut::<3, 3>(3, 3)
+                    .copy_from(&(back * dt_s));
+                (
+                    (g_w * dt_s, Vector3::zeros()),
+                    (input.force_b * dt_s, Vector3::zeros()),
+                )
+            }
+            Discretisation::ZeroOrderHold => {
+                let (first, second) = (dt_s, dt_s * dt_s);
+                let series = RotationSeries::at(&phi);
+                let gamma_1 = series.gamma::<1>();
+                let gamma_2 = series.gamma::<2>();
+                // Gamma_m(omega dt) a dt^m in its two arguments; one more dt from phi = omega dt.
+                let by_rate_1 = series.gamma_times_derivative::<1>(&input.force_b) * (first * dt_s);
+                let by_rate_2 =
+                    series.gamma_times_derivative::<2>(&input.force_b) * (second * dt_s);
+                let mut place = |row, column, block: nalgebra::Matrix3<f64>| {
+                    input_jacobian
+                        .fixed_view_mut::<3, 3>(row, column)
+                        .copy_from(&(back * block));
+                };
+                place(3, 0, by_rate_1);
+                place(3, 3, gamma_1 * first);
+                place(6, 0, by_rate_2);
+                place(6, 3, gamma_2 * second);
+                (
+                    (g_w * dt_s, g_w * (0.5 * second)),
+                    (
+                        gamma_1 * input.force_b * first,
+                        gamma_2 * input.force_b * second,
+                    ),
+                )
+            }
+        };
+        Self {
+            step: GroupAffineStep::new(
+                SE23 {
+                    rotation: SO3::identity(),
+                    velocity: world.0,
+                    position: world.1,
+                },
+                FreeMotion { dt_s },
+                SE23 {
+                    rotation,
+                    velocity: body.0,
+                    position: body.1,
+                },
+            ),
+            input_jacobian,
+            dt_s,
+        }
+    }
+
+    /// Covariance, 9 x 9, that the white noise of the input adds to the left-invariant error:
+    /// `B diag(psd) B^T / dt`, exactly symmetric; zero for an interval of no length.
+    pub fn noise_covariance(&self, noise: &ImuNoise) -> SMatrix<f64, 9, 9> {
+        if self.dt_s <= 0.0 {
+            return SMatrix::zeros();
+        }
+        let mut scaled = self.input_jacobian;
+        for column in 0..6 {
+            let psd = if column < 3 {
+                noise.gyro_psd
+            } else {
+                noise.accel_psd
+            };
+            scaled.column_mut(column).scale_mut(psd / self.dt_s);
+        }
+        let mut covariance = scaled * self.input_jacobian.transpose();
+        covariance.fill_lower_triangle_with_upper_triangle();
+        covariance
+    }
+}

@@ -1,0 +1,76 @@
+//! States that an IMU drives: the pose on SE_2(3) alone (9), or with biases (15).
+//!
+//! The interface lets one filter, one update core and one set of observations serve both.
+
+use nalgebra::{SMatrix, Vector3};
+
+use super::imu::{Discretisation, ImuInput, ImuNoise, ImuStep};
+use crate::lie::{LieGroup, SE23};
+
+/// A Lie group whose first nine tangent coordinates are those of SE_2(3).
+pub trait InertialState<const D: usize>: LieGroup<D> {
+    /// Attitude, velocity and position.
+    fn pose(&self) -> &SE23;
+
+    /// Gyroscope bias, rad/s, body frame; zero where the state has none.
+    fn gyro_bias(&self) -> Vector3<f64>;
+
+    /// Accelerometer bias, m/s^2, body frame; zero where the state has none.
+    fn accel_bias(&self) -> Vector3<f64>;
+
+    /// The state with these parts; biases are dropped where the state has none.
+    fn from_parts(pose: SE23, gyro_bias: Vector3<f64>, accel_bias: Vector3<f64>) -> Self;
+
+    /// The state after one step, the transition matrix F of the left-invariant error and the
+    /// covariance Q (symmetric) that the noise of the interval adds.
+    fn advance(
+        &self,
+        step: &ImuStep,
+        noise: &ImuNoise,
+    ) -> (Self, SMatrix<f64, D, D>, SMatrix<f64, D, D>);
+
+    /// The step that the raw sample `measured` makes from this state, its biases removed.
+    fn imu_step(
+        &self,
+        measured: &ImuInput,
+        g_w: &Vector3<f64>,
+        dt_s: f64,
+        discretisation: Discretisation,
+    ) -> ImuStep {
+        let input = ImuInput {
+            omega_b: measured.omega_b - self.gyro_bias(),
+            force_b: measured.force_b - self.accel_bias(),
+        };
+        ImuStep::new(&input, g_w, dt_s, discretisation)
+    }
+}
+
+impl InertialState<9> for SE23 {
+    fn pose(&self) -> &SE23 {
+        self
+    }
+
+    fn gyro_bias(&self) -> Vector3<f64> {
+        Vector3::zeros()
+    }
+
+    fn accel_bias(&self) -> Vector3<f64> {
+        Vector3::zeros()
+    }
+
+    fn from_parts(pose: SE23, _gyro_bias: Vector3<f64>, _accel_bias: Vector3<f64>) -> Self {
+        pose
+    }
+
+    fn advance(
+        &self,
+        step: &ImuStep,
+        noise: &ImuNoise,
+    ) -> (Self, SMatrix<f64, 9, 9>, SMatrix<f64, 9, 9>) {
+        (
+            step.step.apply(self).normalized(),
+            step.step.left_jacobian(),
+            step.noise_covariance(noise),
+        )
+    }
+}

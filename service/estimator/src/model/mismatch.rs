@@ -1,0 +1,285 @@
+//! The declared ways in which a model may be wrong: the three classes of \[LC\] III, as columns.
+//!
+//! A mismatch is one to three unknown parameters m, small and zero in the assumed model. To first order
+//!
+//! ```text
+//! xi(k|k-1) = F xi + T m + w        class 1, the mean of the process: T = d_kappa   (LC (13), (29))
+//! y - h     = H xi + dh m + v       class 2, the action's model: the scale          (LC (14), (31))
+//!                                   class 3, the action of a perturbation           (LC (15), (33))
+//! ```
+//!
+//! xi is the left-invariant error (body axes), so are the columns of T; those of dh are in the axes of the
+//! residual, world, metres per unit of m. A gain does not see the parameters if `L (H T + dh) = T`.
+
+use nalgebra::{SMatrix, SVector, Vector3};
+
+use super::observation::points::Points;
+use super::odometry::OdometryStep;
+use super::pose::{Pose, RigidPose};
+
+/// Most parameters that one mismatch has.
+pub const MAX_PARAMETERS: usize = 3;
+
+/// Up to three columns of R rows: one for each parameter of a mismatch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Columns<const R: usize> {
+    columns: [SVector<f64, R>; MAX_PARAMETERS],
+    count: usize,
+}
+
+impl<const R: usize> Columns<R> {
+    /// One column.
+    pub fn one(column: SVector<f64, R>) -> Self {
+        Self {
+            columns: [column, SVector::zeros(), SVector::zeros()],
+            count: 1,
+        }
+    }
+
+    /// Three columns.
+    pub fn three(columns: [SVector<f64, R>; MAX_PARAMETERS]) -> Self {
+        Self { columns, count: 3 }
+    }
+
+    /// The columns.
+    pub fn as_slice(&self) -> &[SVector<f64, R>] {
+        &self.columns[..self.count]
+    }
+
+    /// `f` of every column.
+    pub fn map<const Q: usize>(
+        &self,
+        f: impl Fn(&SVector<f64, R>) -> SVector<f64, Q>,
+    ) -> Columns<Q> {
+        Columns {
+            columns: core::array::from_fn(|i| f(&self.columns[i])),
+            count: self.count,
+        }
+    }
+}
+
+/// A mismatch with what is known of the size of its parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Declared<T> {
+    /// The mismatch.
+    pub mismatch: T,
+    /// Standard deviation of each of its parameters; infinity if nothing is known, which is the hard
+    /// constraint of \[LC\].
+    pub sigma: f64,
+}
+
+impl<T> Declared<T> {
+    /// Nothing is known of the size: the constraint of \[LC\].
+    pub fn hard(mismatch: T) -> Self {
+        Self {
+            mismatch,
+            sigma: f64::INFINITY,
+        }
+    }
+
+    /// The parameters have this standard deviation.
+    pub fn soft(mismatch: T, sigma: f64) -> Self {
+        Self { mismatch, sigma }
+    }
+}
+
+/// Class 1: the odometry's increment is `kappa delta_kappa`, \[LC\] (12).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProcessMismatch {
+    /// The translation is `(1 + m) u`: slipping or deflated wheels. One parameter.
+    OdometryScale,
+    /// The rotation gains `m dt` about one axis of the body, m in rad/s: a gyro's bias. One parameter.
+    OdometryRotationBias {
+        /// Index of the axis in the rotation's tangent: 0 in the plane, 0 to 2 in space.
+        axis: usize,
+    },
+}
+
+impl ProcessMismatch {
+    /// `d_kappa / m` of one step, D, left-invariant: `(0, Omega^T u)` for the scale, `(dt e, 0)` for the bias.
+    pub fn direction<G: RigidPose<D, N>, const D: usize, const N: usize>(
+        &self,
+        step: &OdometryStep<G>,
+    ) -> SVector<f64, D> {
+        match *self {
+            Self::OdometryScale => step.scale_direction(),
+            Self::OdometryRotationBias { axis } => {
+                let mut direction = SVector::<f64, D>::zeros();
+                if axis < G::ROTATION_DIM {
+                    direction[axis] = step.dt_s;
+                }
+                direction
+            }
+        }
+    }
+}
+
+/// Classes 2 and 3: what is wrong with one of the position sources of a [`Points`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OutputMismatch {
+    /// Class 2: the source sees `(1 + eps + m) x + R b`. One parameter.
+    MeasurementScale {
+        /// Index of the source in the stacked observation.
+        source: usize,
+    },
+    /// Class 3: the source's frame is turned, `y = Exp(m)^T ((1 + eps) x + R b)`.
+    MeasurementRotation {
+        /// Index of the source in the stacked observation.
+        source: usize,
+        /// The axis in world axes, if it is known: one parameter then. In the plane it is z, and this is
+        /// ignored; in space `None` means any axis: three parameters, of which two can be seen.
+        axis_w: Option<Vector3<f64>>,
+    },
+}
+
+impl OutputMismatch {
+    /// Index of the source that is wrong.
+    pub fn source(&self) -> usize {
+        match *self {
+            Self::MeasurementScale { source } | Self::MeasurementRotation { source, .. } => source,
+        }
+    }
+
+    /// How many parameters it has in N dimensions.
+    pub fn parameters<const N: usize>(&self) -> usize {
+        match self {
+            Self::MeasurementRotation { axis_w: None, .. } if N == 3 => 3,
+            _ => 1,
+        }
+    }
+
+    /// dh: what the parameters add to `points` seen from `chi`, M rows. World axes, metres per unit or rad.
+    /// Zero if the source does not exist.
+    ///
+    /// In body axes (times `R^T`) these are `R^T x` and `-R^T J ((1 + eps) x + R b)`, \[LC\] (31) and (33).
+    pub fn columns<G, const D: usize, const K: usize, const N: usize, const M: usize>(
+        &self,
+        points: &Points<K, N, M>,
+        chi: &G,
+    ) -> Columns<M>
+    where
+        G: Pose<D, N>,
+    {
+        let Some(fix) = points.fixes.get(self.source()) else {
+            return Columns::one(SVector::zeros());
+        };
+        let columns = match *self {
+            Self::MeasurementScale { .. } => Columns::one(chi.position_w()),
+            Self::MeasurementRotation { axis_w, .. } => {
+                rotation_columns(&fix.expected_w(chi), axis_w)
+            }
+        };
+        columns.map(|column| Points::<K, N, M>::place(self.source(), column))
+    }
+}
+
+/// The derivative of `Exp(m)^T y` at `m = 0`: `-J y` in the plane, `y x e_i` (or `y x axis`) in space.
+pub(super) fn rotation_columns<const N: usize>(
+    y: &SVector<f64, N>,
+    axis_w: Option<Vector3<f64>>,
+) -> Columns<N> {
+    if N == 2 {
+        return Columns::one(SVector::from_fn(
+            |row, _| if row == 0 { y[1] } else { -y[0] },
+        ));
+    }
+    let y = Vector3::from_fn(|row, _| y[row]);
+    let about = |axis: Vector3<f64>| {
+        let turned = y.cross(&axis);
+        SVector::<f64, N>::from_fn(|row, _| turned[row])
+    };
+    match axis_w {
+        Some(axis) => Columns::one(about(axis)),
+        None => Columns::three([
+            about(Vector3::x()),
+            about(Vector3::y()),
+            about(Vector3::z()),
+        ]),
+    }
+}
+
+/// Most process mismatches that are followed at a time.
+pub const MAX_PROCESS_MISMATCHES: usize = 4;
+
+/// How many standard deviations of its own noise a travelled way must exceed to tell of a scale.
+const GATE_SIGMAS: f64 = 5.0;
+
+/// T, summed over the steps since the last update: `d <- Ad_{kappa^-1} d + d_kappa / m`.
+///
+/// The columns are left-invariant, at the end of the last step. The scale's column is withheld while the way
+/// is below five standard deviations of the noise of the steps: standing still, its direction is noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProcessColumns<const D: usize> {
+    declared: [Option<Declared<ProcessMismatch>>; MAX_PROCESS_MISMATCHES],
+    columns: [SVector<f64, D>; MAX_PROCESS_MISMATCHES],
+    way_variance: f64,
+}
+
+impl<const D: usize> ProcessColumns<D> {
+    /// No motion yet. `None` if more than [`MAX_PROCESS_MISMATCHES`] are declared.
+    pub fn new(declared: &[Declared<ProcessMismatch>]) -> Option<Self> {
+        if declared.len() > MAX_PROCESS_MISMATCHES {
+            return None;
+        }
+        Some(Self {
+            declared: core::array::from_fn(|i| declared.get(i).copied()),
+            columns: [SVector::zeros(); MAX_PROCESS_MISMATCHES],
+            way_variance: 0.0,
+        })
+    }
+
+    /// Adds one step of odometry with noise covariance `q`, D x D.
+    pub fn advance<G: RigidPose<D, N>, const N: usize>(
+        &mut self,
+        step: &OdometryStep<G>,
+        q: &SMatrix<f64, D, D>,
+    ) {
+        let f = step.left_jacobian();
+        for (declared, column) in self.declared.iter().zip(&mut self.columns) {
+            if let Some(declared) = declared {
+                *column = f * *column + declared.mismatch.direction(step);
+            }
+        }
+        let translation = (0..N).map(|axis| q[(G::POSITION + axis, G::POSITION + axis)]);
+        self.way_variance += translation.sum::<f64>() / N as f64;
+    }
+
+    /// The columns after two steps with no special direction: for a check at start-up. `None` as in
+    /// [`new`](Self::new).
+    pub fn in_general_position<G: RigidPose<D, N>, const N: usize>(
+        declared: &[Declared<ProcessMismatch>],
+    ) -> Option<Self> {
+        let mut columns = Self::new(declared)?;
+        let step = OdometryStep::<G>::new(&SVector::from_fn(|i, _| 0.2 + 0.3 * i as f64), 1.0);
+        columns.advance(&step, &SMatrix::zeros());
+        columns.advance(&step, &SMatrix::zeros());
+        Some(columns)
+    }
+
+    /// Forgets the way: after an update.
+    pub fn reset(&mut self) {
+        self.columns = [SVector::zeros(); MAX_PROCESS_MISMATCHES];
+        self.way_variance = 0.0;
+    }
+
+    /// The columns that stand above their noise, each with what was declared.
+    pub fn active(
+        &self,
+    ) -> impl Iterator<Item = (Declared<ProcessMismatch>, SVector<f64, D>)> + '_ {
+        let pairs = self.declared.iter().zip(&self.columns);
+        pairs.filter_map(|(declared, column)| {
+            declared
+                .filter(|declared| self.is_above_noise(declared.mismatch, column))
+                .map(|declared| (declared, *column))
+        })
+    }
+
+    fn is_above_noise(&self, mismatch: ProcessMismatch, column: &SVector<f64, D>) -> bool {
+        match mismatch {
+            ProcessMismatch::OdometryScale => {
+                column.norm_squared() >= GATE_SIGMAS * GATE_SIGMAS * self.way_variance
+            }
+            ProcessMismatch::OdometryRotationBias { .. } => true,
+        }
+    }
+}

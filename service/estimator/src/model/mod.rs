@@ -1,0 +1,30 @@
+//! What moves the state and what observes it.
+//!
+//! [`group_affine`] is the abstract step of \[IS\] (6); [`imu`] makes one from an IMU sample, [`odometry`] one from
+//! an increment; [`inertial`] is the interface of states that an IMU drives, with [`nav_state`] the one that
+//! carries biases, and [`pose`] that of all states that have a place in the plane or in space; [`observation`]
+//! holds the sensors. [`mismatch`] says how the models may be wrong, as the columns of \[LC\]; [`augmented`] and
+//! [`unknowns`] carry the same mismatches as states.
+
+pub mod augmented;
+pub mod group_affine;
+pub mod imu;
+pub mod inertial;
+pub mod mismatch;
+pub mod nav_state;
+pub mod observation;
+pub mod odometry;
+pub mod pose;
+pub mod unknowns;
+
+pub use augmented::Augmented;
+pub use group_affine::{Automorphism, FreeMotion, GroupAffineStep};
+pub use imu::{Discretisation, ImuInput, ImuNoise, ImuStep};
+pub use inertial::InertialState;
+pub use mismatch::{Columns, Declared, OutputMismatch, ProcessColumns, ProcessMismatch};
+pub use nav_state::NavState;
+pub use observation::points::{PlanarFix, PlanarPair, PointFix, Points, SpatialFix, SpatialPair};
+pub use observation::{HeadingObservation, Observation, PositionObservation, VelocityObservation};
+pub use odometry::OdometryStep;
+pub use pose::{Pose, RigidPose};
+pub use unknowns::{AugmentedPoints, AugmentedStep, Unknowns};

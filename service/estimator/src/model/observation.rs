@@ -1,0 +1,116 @@
+//! What the aiding sensors observe of an inertial state.
+//!
+//! Every observation gives its residual `z = y - h(chi)` and `H` with
+//! `h(chi exp(xi)) = h(chi) + H xi` to first order: H belongs to the left-invariant error. The
+//! residual stays in the sensor's own axes, so the noise covariance needs no rotation; the gain is
+//! the same as with the body-frame innovation `R^T (y - h)` of the papers.
+
+use core::f64::consts::{PI, TAU};
+
+use nalgebra::{Matrix1, Matrix3, SMatrix, SVector, Vector1, Vector3};
+
+use super::inertial::InertialState;
+use crate::lie::{LieGroup, hat};
+
+pub mod points;
+
+/// A measurement of dimension M with additive noise.
+pub trait Observation<G: LieGroup<D>, const D: usize, const M: usize> {
+    /// `y - h(chi)`, M.
+    fn residual(&self, chi: &G) -> SVector<f64, M>;
+    /// H, M x D, of the left-invariant error at `chi`.
+    fn left_jacobian(&self, chi: &G) -> SMatrix<f64, M, D>;
+    /// Covariance of the noise, M x M, symmetric positive definite.
+    fn noise(&self) -> SMatrix<f64, M, M>;
+}
+
+/// Position of an antenna, world frame: `y = p_w + r_wb * lever_arm_b + n`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionObservation {
+    /// Measured position, m, world frame.
+    pub position_w: Vector3<f64>,
+    /// Covariance, m^2, world axes.
+    pub covariance_w: Matrix3<f64>,
+    /// From the IMU to the antenna, m, body frame.
+    pub lever_arm_b: Vector3<f64>,
+}
+
+impl<G: InertialState<D>, const D: usize> Observation<G, D, 3> for PositionObservation {
+    fn residual(&self, chi: &G) -> Vector3<f64> {
+        let pose = chi.pose();
+        self.position_w - pose.position - pose.rotation.rotate(&self.lever_arm_b)
+    }
+
+    fn left_jacobian(&self, chi: &G) -> SMatrix<f64, 3, D> {
+        let r_wb = chi.pose().rotation.matrix();
+        let mut h = SMatrix::<f64, 3, D>::zeros();
+        h.fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&(-r_wb * hat(&self.lever_arm_b)));
+        h.fixed_view_mut::<3, 3>(0, 6).copy_from(&r_wb);
+        h
+    }
+
+    fn noise(&self) -> Matrix3<f64> {
+        self.covariance_w
+    }
+}
+
+/// Velocity of the IMU over ground, world frame: `y = v_w + n`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VelocityObservation {
+    /// Measured velocity, m/s, world frame.
+    pub velocity_w: Vector3<f64>,
+    /// Covariance, (m/s)^2, world axes.
+    pub covariance_w: Matrix3<f64>,
+}
+
+impl<G: InertialState<D>, const D: usize> Observation<G, D, 3> for VelocityObservation {
+    fn residual(&self, chi: &G) -> Vector3<f64> {
+        self.velocity_w - chi.pose().velocity
+    }
+
+    fn left_jacobian(&self, chi: &G) -> SMatrix<f64, 3, D> {
+        let mut h = SMatrix::<f64, 3, D>::zeros();
+        h.fixed_view_mut::<3, 3>(0, 3)
+            .copy_from(&chi.pose().rotation.matrix());
+        h
+    }
+
+    fn noise(&self) -> Matrix3<f64> {
+        self.covariance_w
+    }
+}
+
+/// Heading of the body's x axis, counter-clockwise from east: `y = atan2(R10, R00) + n`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeadingObservation {
+    /// Measured heading, rad.
+    pub heading: f64,
+    /// Standard deviation, rad.
+    pub sigma: f64,
+}
+
+impl<G: InertialState<D>, const D: usize> Observation<G, D, 1> for HeadingObservation {
+    fn residual(&self, chi: &G) -> Vector1<f64> {
+        let difference = self.heading - chi.pose().rotation.heading_rad();
+        Vector1::new((difference + PI).rem_euclid(TAU) - PI)
+    }
+
+    fn left_jacobian(&self, chi: &G) -> SMatrix<f64, 1, D> {
+        let r_wb = chi.pose().rotation.matrix();
+        let forward_w = r_wb.column(0);
+        let horizontal = forward_w.x * forward_w.x + forward_w.y * forward_w.y;
+        let mut h = SMatrix::<f64, 1, D>::zeros();
+        // Pointing straight up or down there is no heading, and nothing to learn from one.
+        if horizontal > 1e-12 {
+            let across_w = Vector3::new(-forward_w.y, forward_w.x, 0.0) / horizontal;
+            let row = -across_w.transpose() * r_wb * hat(&Vector3::x());
+            h.fixed_view_mut::<1, 3>(0, 0).copy_from(&row);
+        }
+        h
+    }
+
+    fn noise(&self) -> Matrix1<f64> {
+        Matrix1::new(self.sigma * self.sigma)
+    }
+}

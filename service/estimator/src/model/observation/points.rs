@@ -1,0 +1,107 @@
+//! Positions of points of the body, seen by one or several sources at once: \[LC\] (25), stacked.
+//!
+//! `y_i = (1 + eps_i) x + R b_i + v_i`, world frame, metres. The residual stays in world axes, as everywhere
+//! here; the body-frame innovation of \[LC\] (27) is `R^T` times it, and leads to the same correction.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::Observation;
+use crate::model::pose::Pose;
+
+/// What one source says of one point of the body, N = 2 or 3 dimensions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointFix<const N: usize> {
+    /// Measured position, m, world frame.
+    pub position_w: SVector<f64, N>,
+    /// Covariance, m^2, world axes.
+    pub covariance_w: SMatrix<f64, N, N>,
+    /// From the body's origin to the point, m, body frame.
+    pub lever_arm_b: SVector<f64, N>,
+    /// The scale error `eps` that the source is assumed to have; 0 for a true scale.
+    pub scale_error: f64,
+}
+
+impl<const N: usize> PointFix<N> {
+    /// Where the fix is expected, m, world frame: `(1 + eps) x + R b`.
+    pub fn expected_w<G: Pose<D, N>, const D: usize>(&self, chi: &G) -> SVector<f64, N> {
+        chi.point_w(&self.lever_arm_b, 1.0 + self.scale_error)
+    }
+}
+
+/// K fixes of N dimensions, taken together as one observation of `M = K N`. Their noises are independent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Points<const K: usize, const N: usize, const M: usize> {
+    /// The fixes, in the order in which the observation stacks them.
+    pub fixes: [PointFix<N>; K],
+}
+
+/// One fix in the plane.
+pub type PlanarFix = Points<1, 2, 2>;
+/// Two fixes in the plane.
+pub type PlanarPair = Points<2, 2, 4>;
+/// One fix in space.
+pub type SpatialFix = Points<1, 3, 3>;
+/// Two fixes in space.
+pub type SpatialPair = Points<2, 3, 6>;
+
+impl<const K: usize, const N: usize, const M: usize> Points<K, N, M> {
+    /// These fixes as one observation.
+    pub fn new(fixes: [PointFix<N>; K]) -> Self {
+        const { assert!(M == K * N, "M is the number of fixes times their dimension") };
+        Self { fixes }
+    }
+
+    /// A column of the observation that is `part` in the rows of `source` and zero in the others.
+    pub(crate) fn place(source: usize, part: &SVector<f64, N>) -> SVector<f64, M> {
+        let mut whole = SVector::<f64, M>::zeros();
+        for row in 0..N {
+            whole[source * N + row] = part[row];
+        }
+        whole
+    }
+}
+
+impl<G: Pose<D, N>, const D: usize, const K: usize, const N: usize, const M: usize>
+    Observation<G, D, M> for Points<K, N, M>
+{
+    fn residual(&self, chi: &G) -> SVector<f64, M> {
+        let mut residual = SVector::<f64, M>::zeros();
+        for (source, fix) in self.fixes.iter().enumerate() {
+            residual += Self::place(source, &(fix.position_w - fix.expected_w(chi)));
+        }
+        residual
+    }
+
+    fn left_jacobian(&self, chi: &G) -> SMatrix<f64, M, D> {
+        let mut h = SMatrix::<f64, M, D>::zeros();
+        for (source, fix) in self.fixes.iter().enumerate() {
+            let block = chi.point_jacobian(&fix.lever_arm_b, 1.0 + fix.scale_error);
+            for column in 0..D {
+                for row in 0..N {
+                    h[(source * N + row, column)] = block[(row, column)];
+                }
+            }
+        }
+        h
+    }
+
+    fn noise(&self) -> SMatrix<f64, M, M> {
+        self.noise_covariance()
+    }
+}
+
+impl<const K: usize, const N: usize, const M: usize> Points<K, N, M> {
+    /// Covariance of the stacked noise, M x M: one block for each fix.
+    pub fn noise_covariance(&self) -> SMatrix<f64, M, M> {
+        let mut noise = SMatrix::<f64, M, M>::zeros();
+        for (source, fix) in self.fixes.iter().enumerate() {
+            for column in 0..N {
+                for row in 0..N {
+                    noise[(source * N + row, source * N + column)] =
+                        fix.covariance_w[(row, column)];
+                }
+            }
+        }
+        noise
+    }
+}

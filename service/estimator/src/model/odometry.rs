@@ -1,0 +1,62 @@
+//! Odometry as a group-affine step, in the plane and in space: `chi+ = chi kappa exp(w)`, \[LC\] (23).
+//!
+//! `kappa = (Omega, u)`: the rotation and the translation (m) of the body over the step, in its own frame at
+//! the start of the step. The automorphism is the identity, so that `F = Ad_{kappa^-1}` in the left-invariant
+//! error, whatever the state. w is white, with covariance Q in the tangent of the group.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::pose::RigidPose;
+
+/// One step of odometry on the group G.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OdometryStep<G> {
+    /// `kappa = (Omega, u)`.
+    pub kappa: G,
+    /// Length of the step, s.
+    pub dt_s: f64,
+}
+
+impl<G> OdometryStep<G> {
+    /// The step over `dt_s` seconds with the increment `(rotation vector, translation)`, rad and m, in the
+    /// body frame at its start: `(theta, x, y)` in the plane.
+    pub fn new<const D: usize, const N: usize>(increment: &SVector<f64, D>, dt_s: f64) -> Self
+    where
+        G: RigidPose<D, N>,
+    {
+        Self {
+            kappa: G::from_increment(increment),
+            dt_s,
+        }
+    }
+
+    /// `chi kappa`.
+    pub fn apply<const D: usize, const N: usize>(&self, chi: &G) -> G
+    where
+        G: RigidPose<D, N>,
+    {
+        chi.compose(&self.kappa)
+    }
+
+    /// F, D x D, of the left-invariant error: `Ad_{kappa^-1}`.
+    pub fn left_jacobian<const D: usize, const N: usize>(&self) -> SMatrix<f64, D, D>
+    where
+        G: RigidPose<D, N>,
+    {
+        self.kappa.inverse().adjoint()
+    }
+
+    /// `(0, Omega^T u)`, D: how the left-invariant error grows with a relative error of the translation, m
+    /// (\[LC\] (29)).
+    pub fn scale_direction<const D: usize, const N: usize>(&self) -> SVector<f64, D>
+    where
+        G: RigidPose<D, N>,
+    {
+        let turned = self.kappa.rotation_matrix().transpose() * self.kappa.position_w();
+        let mut direction = SVector::<f64, D>::zeros();
+        for axis in 0..N {
+            direction[G::POSITION + axis] = turned[axis];
+        }
+        direction
+    }
+}

@@ -1,0 +1,144 @@
+//! States that know where they are: what a position fix needs, in the plane (N = 2) and in space (N = 3).
+//!
+//! `(R, x)`: rotation body to world, position (m) in the world frame, whatever else the state carries.
+//! A point fixed to the body at `b` lies at `x + R b`; in the left-invariant error its derivative is
+//! `R [ (d/dphi Exp(phi) b), I ]`: `[J b, I]` in the plane and `[-hat(b), I]` in space.
+
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
+
+use super::nav_state::NavState;
+use crate::lie::{LieGroup, SE2, SE3, SE23, SO2, SO3, hat};
+
+/// A Lie group of dimension D whose element places a body in N dimensions.
+pub trait Pose<const D: usize, const N: usize>: LieGroup<D> {
+    /// Where the position begins in the tangent vector.
+    const POSITION: usize;
+
+    /// Position, m, world frame.
+    fn position_w(&self) -> SVector<f64, N>;
+
+    /// Rotation matrix, body to world.
+    fn rotation_matrix(&self) -> SMatrix<f64, N, N>;
+
+    /// `d Exp(phi) b / d phi` at zero, in the columns of the rotation; zero elsewhere.
+    fn lever_jacobian(lever_arm_b: &SVector<f64, N>) -> SMatrix<f64, N, D>;
+
+    /// `scale x + R b`, m, world frame: where a sensor with this scale sees the point `b` of the body
+    /// (\[LC\] (25), `scale = 1 + eps`).
+    fn point_w(&self, lever_arm_b: &SVector<f64, N>, scale: f64) -> SVector<f64, N> {
+        self.position_w() * scale + self.rotation_matrix() * lever_arm_b
+    }
+
+    /// The derivative of [`point_w`](Self::point_w) in the left-invariant error, N x D:
+    /// `R [J b, scale I]`, or `R [-hat(b), scale I]`.
+    fn point_jacobian(&self, lever_arm_b: &SVector<f64, N>, scale: f64) -> SMatrix<f64, N, D> {
+        let r_wb = self.rotation_matrix();
+        let mut h = r_wb * Self::lever_jacobian(lever_arm_b);
+        for row in 0..N {
+            for column in 0..N {
+                h[(row, Self::POSITION + column)] = scale * r_wb[(row, column)];
+            }
+        }
+        h
+    }
+}
+
+/// A pose that odometry drives: a rotation, a position and nothing else.
+pub trait RigidPose<const D: usize, const N: usize>: Pose<D, N> {
+    /// `(Exp(phi), u)` of the increment `(phi, u)`: rotation vector in radians, translation in metres, in the
+    /// body frame at the start of the step. The translation is taken literally, which `exp` would not.
+    fn from_increment(increment: &SVector<f64, D>) -> Self;
+
+    /// The same rotation at another position, m, world frame.
+    fn with_position_w(&self, position_w: &SVector<f64, N>) -> Self;
+}
+
+impl Pose<3, 2> for SE2 {
+    const POSITION: usize = 1;
+
+    fn position_w(&self) -> Vector2<f64> {
+        self.position
+    }
+
+    fn rotation_matrix(&self) -> Matrix2<f64> {
+        self.rotation.matrix()
+    }
+
+    fn lever_jacobian(lever_arm_b: &Vector2<f64>) -> SMatrix<f64, 2, 3> {
+        let mut jacobian = SMatrix::zeros();
+        jacobian[(0, 0)] = -lever_arm_b.y;
+        jacobian[(1, 0)] = lever_arm_b.x;
+        jacobian
+    }
+}
+
+impl RigidPose<3, 2> for SE2 {
+    fn from_increment(increment: &Vector3<f64>) -> Self {
+        Self {
+            rotation: SO2::from_angle(increment.x),
+            position: increment.yz(),
+        }
+    }
+
+    fn with_position_w(&self, position_w: &Vector2<f64>) -> Self {
+        Self {
+            position: *position_w,
+            ..*self
+        }
+    }
+}
+
+impl RigidPose<6, 3> for SE3 {
+    fn from_increment(increment: &SVector<f64, 6>) -> Self {
+        Self {
+            rotation: SO3::exp(&increment.fixed_rows::<3>(0).into_owned()),
+            position: increment.fixed_rows::<3>(3).into_owned(),
+        }
+    }
+
+    fn with_position_w(&self, position_w: &Vector3<f64>) -> Self {
+        Self {
+            position: *position_w,
+            ..*self
+        }
+    }
+}
+
+/// `-hat(b)` in the first three of D columns.
+fn spatial_lever<const D: usize>(lever_arm_b: &Vector3<f64>) -> SMatrix<f64, 3, D> {
+    let mut jacobian = SMatrix::<f64, 3, D>::zeros();
+    let block = -hat(lever_arm_b);
+    for row in 0..3 {
+        for column in 0..3 {
+            jacobian[(row, column)] = block[(row, column)];
+        }
+    }
+    jacobian
+}
+
+/// Implements [`Pose`] in space for a state with the given tangent dimension, index and pose.
+macro_rules! spatial_pose {
+    ($state:ty, $dimension:literal, $position:literal, $self:ident => $pose:expr) => {
+        impl Pose<$dimension, 3> for $state {
+            const POSITION: usize = $position;
+
+            fn position_w(&self) -> Vector3<f64> {
+                let $self = self;
+                $pose.position
+            }
+
+            fn rotation_matrix(&self) -> SMatrix<f64, 3, 3> {
+                let $self = self;
+                $pose.rotation.matrix()
+            }
+
+            fn lever_jacobian(lever_arm_b: &Vector3<f64>) -> SMatrix<f64, 3, $dimension> {
+                spatial_lever(lever_arm_b)
+            }
+        }
+    };
+}
+
+spatial_pose!(SE3, 6, 3, state => state);
+spatial_pose!(SE23, 9, 6, state => state);
+spatial_pose!(NavState, 15, 6, state => state.pose);

@@ -1,0 +1,162 @@
+//! Control requests and their responses.
+
+use iceoryx2::prelude::ZeroCopySend;
+use serde::{Deserialize, Serialize};
+
+use super::layout::layout;
+use super::{Counters, INPUTS, NAV_TRI, REASONS, serde_array};
+
+/// Request: forget the state and initialise anew.
+pub const CONTROL_RESET: u32 = 1;
+/// Request: continue from the state in the request.
+pub const CONTROL_SET_STATE: u32 = 2;
+/// Request: answer with the current state.
+pub const CONTROL_SNAPSHOT: u32 = 3;
+/// Request: answer when every input sent before has been processed.
+pub const CONTROL_BARRIER: u32 = 4;
+
+/// Name of a kind of request; `"unknown"` for a code that is not defined.
+#[must_use]
+pub const fn control_kind_name(code: u32) -> &'static str {
+    match code {
+        CONTROL_RESET => "reset",
+        CONTROL_SET_STATE => "set-state",
+        CONTROL_SNAPSHOT => "snapshot",
+        CONTROL_BARRIER => "barrier",
+        _ => "unknown",
+    }
+}
+
+/// Status: done.
+pub const CONTROL_OK: u32 = 0;
+/// Status: refused; [`ControlResponse::reason`] says why.
+pub const CONTROL_REFUSED: u32 = 1;
+
+/// Name of a status; `"unknown"` for a code that is not defined.
+#[must_use]
+pub const fn control_status_name(code: u32) -> &'static str {
+    match code {
+        CONTROL_OK => "ok",
+        CONTROL_REFUSED => "refused",
+        _ => "unknown",
+    }
+}
+
+/// Bytes of the text of a refusal.
+pub const REASON_TEXT_LEN: usize = 256;
+
+/// A state of any model with its covariance.
+///
+/// In the plane `q_wb` turns about z, `p_w_m` is `(x, y, 0)` and `dimension` is 3. The covariance is that of the
+/// left-invariant error, as in the estimates.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.StateVector.v1")]
+pub struct StateVector {
+    /// `MODEL_*` code.
+    pub model: u32,
+    /// Dimension of the covariance: 15 or 9 (SE_2(3)), 6 (SE(3)), 3 (SE(2)). In a request 0 means the configured one.
+    pub dimension: u32,
+    /// Time the state holds at, nanoseconds of the sensor clock.
+    pub stamp_ns: u64,
+    /// Attitude, body to world, unit quaternion x, y, z, w.
+    pub q_wb: [f64; 4],
+    /// Velocity, world frame, m/s.
+    pub v_w_mps: [f64; 3],
+    /// Position, world frame, m.
+    pub p_w_m: [f64; 3],
+    /// Gyroscope bias, body frame, rad/s.
+    pub gyro_bias_rps: [f64; 3],
+    /// Accelerometer bias, body frame, m/s^2.
+    pub accel_bias_mps2: [f64; 3],
+    /// Upper triangle of the `dimension` x `dimension` covariance, row by row, then zeros.
+    #[serde(with = "serde_array")]
+    pub covariance: [f64; NAV_TRI],
+}
+
+layout! {
+    StateVector as "inekf.StateVector.v1", size 1104, align 8 {
+        model: 0, dimension: 4, stamp_ns: 8, q_wb: 16, v_w_mps: 48, p_w_m: 72, gyro_bias_rps: 96,
+        accel_bias_mps2: 120, covariance: 144,
+    }
+}
+
+/// What a client asks of the daemon.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.ControlRequest.v1")]
+pub struct ControlRequest {
+    /// `CONTROL_*` kind.
+    pub kind: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Chosen by the client; the response repeats it.
+    pub request_id: u64,
+    /// The state to continue from with [`CONTROL_SET_STATE`], else zero.
+    pub state: StateVector,
+}
+
+layout! {
+    ControlRequest as "inekf.ControlRequest.v1", size 1120, align 8 {
+        kind: 0, reserved: 4, request_id: 8, state: 16,
+    }
+}
+
+/// What the daemon answers.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.ControlResponse.v1")]
+pub struct ControlResponse {
+    /// The id of the request.
+    pub request_id: u64,
+    /// [`CONTROL_OK`] or [`CONTROL_REFUSED`].
+    pub status: u32,
+    /// `STATE_*` code of the daemon after the request.
+    pub state_code: u32,
+    /// `WAITING_FOR_*` code of the daemon after the request.
+    pub waiting_for: u32,
+    /// Bytes of `reason` in use.
+    pub reason_len: u32,
+    /// Why the request was refused, UTF-8; read it with [`ControlResponse::reason`].
+    #[serde(with = "serde_array")]
+    pub reason: [u8; REASON_TEXT_LEN],
+    /// What became of the inputs.
+    pub counters: Counters,
+    /// Messages received, indexed by `INPUT_*`.
+    pub received: [u64; INPUTS],
+    /// Rejected inputs, indexed by `REASON_*` code.
+    pub rejected_by_reason: [u64; REASONS],
+    /// The current state with [`CONTROL_SNAPSHOT`], else zero.
+    pub state: StateVector,
+}
+
+layout! {
+    ControlResponse as "inekf.ControlResponse.v1", size 1600, align 8 {
+        request_id: 0, status: 8, state_code: 12, waiting_for: 16, reason_len: 20, reason: 24,
+        counters: 280, received: 320, rejected_by_reason: 368, state: 496,
+    }
+}
+
+impl ControlResponse {
+    /// Writes the text of a refusal, cut at a character boundary if it exceeds [`REASON_TEXT_LEN`] bytes.
+    pub fn set_reason(&mut self, text: &str) {
+        let mut end = text.len().min(REASON_TEXT_LEN);
+        while !text.is_char_boundary(end) {
+            end -= 1;
+        }
+        self.reason = [0; REASON_TEXT_LEN];
+        self.reason[..end].copy_from_slice(&text.as_bytes()[..end]);
+        self.reason_len = end as u32;
+    }
+
+    /// The text of a refusal. Whatever a faulty writer left, this is text: the length is cut to the field, and what
+    /// is not UTF-8 ends it.
+    #[must_use]
+    pub fn reason(&self) -> &str {
+        let used = (self.reason_len as usize).min(REASON_TEXT_LEN);
+        match str::from_utf8(&self.reason[..used]) {
+            Ok(text) => text,
+            Err(error) => str::from_utf8(&self.reason[..error.valid_up_to()]).unwrap_or_default(),
+        }
+    }
+}

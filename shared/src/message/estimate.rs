@@ -1,0 +1,239 @@
+//! Estimates, one payload per model, and what they have in common.
+//!
+//! The covariance is always that of the left-invariant error, `chi = chi_hat * exp(xi)` with `xi` in body
+//! coordinates, as upper triangle row by row ([`super::triangle_index`]). Order of `xi`: rotation, velocity,
+//! position, gyro bias, accelerometer bias (SE_2(3)); rotation, position (SE(3)); theta, x, y (SE(2)). Units are
+//! products of rad, m/s, m, rad/s and m/s^2.
+
+use iceoryx2::prelude::ZeroCopySend;
+use serde::{Deserialize, Serialize};
+
+use super::layout::layout;
+use super::{MAX_SOURCES, Message, NAV_TRI, SE2_TRI, SE3_TRI, Zero, serde_array};
+
+/// Flag: a sample was propagated.
+pub const ESTIMATE_PROPAGATED: u32 = 1;
+/// Flag: a fix was fused; the estimate before it has the same stamp.
+pub const ESTIMATE_UPDATED: u32 = 2;
+/// Flag: the state was set anew and does not continue the one before.
+pub const ESTIMATE_RESET: u32 = 4;
+/// Flag: there has been no aiding for long, the error grows.
+pub const ESTIMATE_DEGRADED: u32 = 8;
+/// Flag: a late fix was fused by replaying the samples since.
+pub const ESTIMATE_REPLAYED: u32 = 16;
+/// Every flag that is defined.
+pub const ESTIMATE_FLAGS: u32 =
+    ESTIMATE_PROPAGATED | ESTIMATE_UPDATED | ESTIMATE_RESET | ESTIMATE_DEGRADED | ESTIMATE_REPLAYED;
+
+/// Model: an IMU drives SE_2(3) with biases ([`EstimateSe23`]).
+pub const MODEL_IMU: u32 = 1;
+/// Model: spatial odometry drives SE(3) ([`EstimateSe3`]).
+pub const MODEL_ODOMETRY_3D: u32 = 2;
+/// Model: planar odometry drives SE(2) ([`EstimateSe2`]).
+pub const MODEL_ODOMETRY_2D: u32 = 3;
+
+/// The `source` of an estimate that no fix was fused into.
+pub const NO_SOURCE: u32 = u32::MAX;
+
+/// Name of one estimate flag; `"unknown"` for anything else, a combination of flags included.
+#[must_use]
+pub const fn estimate_flag_name(flag: u32) -> &'static str {
+    match flag {
+        ESTIMATE_PROPAGATED => "propagated",
+        ESTIMATE_UPDATED => "updated",
+        ESTIMATE_RESET => "reset",
+        ESTIMATE_DEGRADED => "degraded",
+        ESTIMATE_REPLAYED => "replayed",
+        _ => "unknown",
+    }
+}
+
+/// Name of a model as a configuration file spells it; `"unknown"` for a code that is not defined.
+#[must_use]
+pub const fn model_name(code: u32) -> &'static str {
+    match code {
+        MODEL_IMU => "imu",
+        MODEL_ODOMETRY_3D => "odometry3d",
+        MODEL_ODOMETRY_2D => "odometry2d",
+        _ => "unknown",
+    }
+}
+
+/// What became of the inputs since the daemon's start.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.Counters.v1")]
+pub struct Counters {
+    /// Fixes that were fused.
+    pub accepted: u64,
+    /// Fixes that the chi-square gate refused.
+    pub gated: u64,
+    /// Fixes that came too late to be fused.
+    pub late: u64,
+    /// Inputs that never arrived, counted from gaps in `seq`.
+    pub lost: u64,
+    /// Inputs that were refused by a check; by reason in [`super::Health`].
+    pub rejected: u64,
+}
+
+layout! {
+    Counters as "inekf.Counters.v1", size 40, align 8 {
+        accepted: 0, gated: 8, late: 16, lost: 24, rejected: 32,
+    }
+}
+
+/// What every estimate starts with.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.EstimateHead.v1")]
+pub struct EstimateHead {
+    /// Time the state holds at, nanoseconds of the sensor clock.
+    pub stamp_ns: u64,
+    /// `seq` of the IMU or odometry sample that the estimate answers.
+    pub seq: u64,
+    /// `sent_ns` of that sample, CLOCK_MONOTONIC.
+    pub sent_ns: u64,
+    /// When the daemon took that sample, CLOCK_MONOTONIC, nanoseconds.
+    pub received_ns: u64,
+    /// When the daemon published the estimate, CLOCK_MONOTONIC, nanoseconds.
+    pub published_ns: u64,
+    /// Counts the published estimates, by one.
+    pub estimate_seq: u64,
+    /// How often the state was set anew since the daemon's start.
+    pub reset_count: u64,
+    /// How far the position jumped at the last reset, m.
+    pub reset_jump_m: f64,
+    /// `ESTIMATE_*` flags.
+    pub flags: u32,
+    /// `STATE_*` code of the daemon.
+    pub state: u32,
+    /// Source of the fix that was fused, [`NO_SOURCE`] if none was.
+    pub source: u32,
+    /// Dimension of the covariance: 15 or 9 (SE_2(3)), 6 (SE(3)), 3 (SE(2)).
+    pub dimension: u32,
+    /// What became of the inputs.
+    pub counters: Counters,
+    /// Last normalised innovation squared of each position source; NaN before its first fix.
+    pub nis: [f64; MAX_SOURCES],
+}
+
+layout! {
+    EstimateHead as "inekf.EstimateHead.v1", size 184, align 8 {
+        stamp_ns: 0, seq: 8, sent_ns: 16, received_ns: 24, published_ns: 32, estimate_seq: 40,
+        reset_count: 48, reset_jump_m: 56, flags: 64, state: 68, source: 72, dimension: 76,
+        counters: 80, nis: 120,
+    }
+}
+
+impl EstimateHead {
+    /// The head before anything has happened: zero, but no source and every NIS NaN.
+    pub const UNSTARTED: Self = Self {
+        source: NO_SOURCE,
+        nis: [f64::NAN; MAX_SOURCES],
+        ..Self::ZERO
+    };
+}
+
+/// Estimate of the IMU model: pose and velocity on SE_2(3), biases beside it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.EstimateSe23.v1")]
+pub struct EstimateSe23 {
+    /// Stamps, flags and counters.
+    pub head: EstimateHead,
+    /// Attitude, body to world, unit quaternion x, y, z, w.
+    pub q_wb: [f64; 4],
+    /// Velocity, world frame, m/s.
+    pub v_w_mps: [f64; 3],
+    /// Position of the IMU, world frame, m.
+    pub p_w_m: [f64; 3],
+    /// Gyroscope bias, body frame, rad/s.
+    pub gyro_bias_rps: [f64; 3],
+    /// Accelerometer bias, body frame, m/s^2.
+    pub accel_bias_mps2: [f64; 3],
+    /// Upper triangle of the covariance. With 9 states the triangle of the 9 x 9 fills the first 45 entries and the
+    /// rest is zero.
+    #[serde(with = "serde_array")]
+    pub covariance: [f64; NAV_TRI],
+}
+
+layout! {
+    EstimateSe23 as "inekf.EstimateSe23.v1", size 1272, align 8 {
+        head: 0, q_wb: 184, v_w_mps: 216, p_w_m: 240, gyro_bias_rps: 264, accel_bias_mps2: 288,
+        covariance: 312,
+    }
+}
+
+/// Estimate of the spatial odometry model: a pose on SE(3).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.EstimateSe3.v1")]
+pub struct EstimateSe3 {
+    /// Stamps, flags and counters.
+    pub head: EstimateHead,
+    /// Attitude, body to world, unit quaternion x, y, z, w.
+    pub q_wb: [f64; 4],
+    /// Position, world frame, m.
+    pub p_w_m: [f64; 3],
+    /// Upper triangle of the covariance: rotation, position.
+    pub covariance: [f64; SE3_TRI],
+}
+
+layout! {
+    EstimateSe3 as "inekf.EstimateSe3.v1", size 408, align 8 {
+        head: 0, q_wb: 184, p_w_m: 216, covariance: 240,
+    }
+}
+
+/// Estimate of the planar odometry model: a pose on SE(2).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.EstimateSe2.v1")]
+pub struct EstimateSe2 {
+    /// Stamps, flags and counters.
+    pub head: EstimateHead,
+    /// Heading, rad, counter-clockwise from east.
+    pub theta_rad: f64,
+    /// Position, world frame, m.
+    pub p_w_m: [f64; 2],
+    /// Upper triangle of the covariance: theta, x, y.
+    pub covariance: [f64; SE2_TRI],
+}
+
+layout! {
+    EstimateSe2 as "inekf.EstimateSe2.v1", size 256, align 8 {
+        head: 0, theta_rad: 184, p_w_m: 192, covariance: 208,
+    }
+}
+
+/// The payload of the `estimate` topic under one model.
+pub trait EstimateMessage: Message {
+    /// The `MODEL_*` code whose estimate this is.
+    const MODEL: u32;
+
+    /// Stamps, flags and counters.
+    fn head(&self) -> &EstimateHead;
+
+    /// Stamps, flags and counters, to be written.
+    fn head_mut(&mut self) -> &mut EstimateHead;
+}
+
+macro_rules! estimate_of {
+    ($name:ident, $model:expr) => {
+        impl EstimateMessage for $name {
+            const MODEL: u32 = $model;
+
+            fn head(&self) -> &EstimateHead {
+                &self.head
+            }
+
+            fn head_mut(&mut self) -> &mut EstimateHead {
+                &mut self.head
+            }
+        }
+    };
+}
+
+estimate_of!(EstimateSe23, MODEL_IMU);
+estimate_of!(EstimateSe3, MODEL_ODOMETRY_3D);
+estimate_of!(EstimateSe2, MODEL_ODOMETRY_2D);

@@ -1,0 +1,175 @@
+//! Health of the daemon, and the codes it speaks in.
+
+use iceoryx2::prelude::ZeroCopySend;
+use serde::{Deserialize, Serialize};
+
+use super::Counters;
+use super::layout::layout;
+
+/// State: not initialised; [`Health::waiting_for`] says what is missing.
+pub const STATE_WAITING: u32 = 1;
+/// State: initialising from the accelerometer.
+pub const STATE_ALIGNING: u32 = 2;
+/// State: estimating.
+pub const STATE_RUNNING: u32 = 3;
+/// State: estimating, but no fix was accepted for long.
+pub const STATE_DEGRADED: u32 = 4;
+/// State: the IMU or odometry has fallen silent.
+pub const STATE_STALE: u32 = 5;
+/// State: paused on request.
+pub const STATE_PAUSED: u32 = 6;
+
+/// Name of a state; `"unknown"` for a code that is not defined.
+#[must_use]
+pub const fn state_name(code: u32) -> &'static str {
+    match code {
+        STATE_WAITING => "waiting",
+        STATE_ALIGNING => "aligning",
+        STATE_RUNNING => "running",
+        STATE_DEGRADED => "degraded",
+        STATE_STALE => "stale",
+        STATE_PAUSED => "paused",
+        _ => "unknown",
+    }
+}
+
+/// Waiting for nothing.
+pub const WAITING_FOR_NOTHING: u32 = 0;
+/// Waiting for the first IMU or odometry sample.
+pub const WAITING_FOR_IMU: u32 = 1;
+/// Waiting for the first position fix.
+pub const WAITING_FOR_POSITION: u32 = 2;
+/// Waiting until enough samples have been averaged to find level.
+pub const WAITING_FOR_LEVEL: u32 = 3;
+/// Waiting for a set-state request.
+pub const WAITING_FOR_REQUEST: u32 = 4;
+
+/// Name of what the daemon waits for; `"unknown"` for a code that is not defined.
+#[must_use]
+pub const fn waiting_for_name(code: u32) -> &'static str {
+    match code {
+        WAITING_FOR_NOTHING => "nothing",
+        WAITING_FOR_IMU => "imu",
+        WAITING_FOR_POSITION => "position",
+        WAITING_FOR_LEVEL => "level",
+        WAITING_FOR_REQUEST => "request",
+        _ => "unknown",
+    }
+}
+
+/// Slots for reasons of rejection. Codes are indices into them; the unused ones leave room for reasons to come.
+pub const REASONS: usize = 16;
+
+/// Rejected: a number is NaN or infinite.
+pub const REASON_NOT_FINITE: u32 = 0;
+/// Rejected: a number is outside its allowed range.
+pub const REASON_OUT_OF_RANGE: u32 = 1;
+/// Rejected: the stamp is not after the last one.
+pub const REASON_STAMP_NOT_AFTER: u32 = 2;
+/// Rejected: the gap since the last sample is longer than allowed.
+pub const REASON_GAP: u32 = 3;
+/// Rejected: the source is not configured.
+pub const REASON_UNKNOWN_SOURCE: u32 = 4;
+/// Rejected: the covariance is not symmetric positive definite.
+pub const REASON_BAD_COVARIANCE: u32 = 5;
+/// Rejected: a flag is set that is not defined.
+pub const REASON_BAD_FLAGS: u32 = 6;
+/// Rejected: the configured model does not use this input.
+pub const REASON_WRONG_MODEL: u32 = 7;
+/// Rejected: a buffer of the daemon was full.
+pub const REASON_BUFFER_FULL: u32 = 8;
+/// Rejected: the estimator failed on it.
+pub const REASON_INTERNAL: u32 = 9;
+/// Rejected: the dimension of a fix is none that is defined.
+pub const REASON_BAD_DIMENSION: u32 = 10;
+/// Rejected: it came before the state was initialised, or while paused.
+pub const REASON_NOT_READY: u32 = 11;
+
+/// Name of a reason for rejection; `"unknown"` for a code that is not defined.
+#[must_use]
+pub const fn reason_name(code: u32) -> &'static str {
+    match code {
+        REASON_NOT_FINITE => "not finite",
+        REASON_OUT_OF_RANGE => "out of range",
+        REASON_STAMP_NOT_AFTER => "stamp not after the last",
+        REASON_GAP => "gap too long",
+        REASON_UNKNOWN_SOURCE => "unknown source",
+        REASON_BAD_COVARIANCE => "bad covariance",
+        REASON_BAD_FLAGS => "bad flags",
+        REASON_WRONG_MODEL => "not an input of this model",
+        REASON_BUFFER_FULL => "buffer full",
+        REASON_INTERNAL => "internal",
+        REASON_BAD_DIMENSION => "bad dimension",
+        REASON_NOT_READY => "not ready",
+        _ => "unknown",
+    }
+}
+
+/// Number of input topics: the length of [`Health::received`].
+pub const INPUTS: usize = 6;
+
+/// Index of the IMU topic in [`Health::received`].
+pub const INPUT_IMU: usize = 0;
+/// Index of the planar odometry topic in [`Health::received`].
+pub const INPUT_ODOMETRY_2D: usize = 1;
+/// Index of the spatial odometry topic in [`Health::received`].
+pub const INPUT_ODOMETRY_3D: usize = 2;
+/// Index of the position topic in [`Health::received`].
+pub const INPUT_POSITION: usize = 3;
+/// Index of the velocity topic in [`Health::received`].
+pub const INPUT_VELOCITY: usize = 4;
+/// Index of the heading topic in [`Health::received`].
+pub const INPUT_HEADING: usize = 5;
+
+/// Name of the input topic at an index of [`Health::received`]; `"unknown"` beyond them.
+#[must_use]
+pub const fn input_name(index: usize) -> &'static str {
+    match index {
+        INPUT_IMU => "imu",
+        INPUT_ODOMETRY_2D => "odometry2d",
+        INPUT_ODOMETRY_3D => "odometry3d",
+        INPUT_POSITION => "position",
+        INPUT_VELOCITY => "velocity",
+        INPUT_HEADING => "heading",
+        _ => "unknown",
+    }
+}
+
+/// How the daemon is, about once a second.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.Health.v1")]
+pub struct Health {
+    /// When it was written, CLOCK_MONOTONIC, nanoseconds.
+    pub stamp_ns: u64,
+    /// Since the daemon's start, nanoseconds.
+    pub uptime_ns: u64,
+    /// Process id of the daemon.
+    pub instance_pid: u64,
+    /// `STATE_*` code.
+    pub state: u32,
+    /// `WAITING_FOR_*` code.
+    pub waiting_for: u32,
+    /// `MODEL_*` code.
+    pub model: u32,
+    /// No flag is defined: zero.
+    pub flags: u32,
+    /// Stamp of the last accepted IMU or odometry sample, nanoseconds of the sensor clock; 0 before the first.
+    pub last_imu_stamp_ns: u64,
+    /// Rate at which such samples arrive, Hz.
+    pub imu_rate_hz: f64,
+    /// What became of the inputs.
+    pub counters: Counters,
+    /// Rejected inputs, indexed by `REASON_*` code.
+    pub rejected_by_reason: [u64; REASONS],
+    /// Messages received, indexed by `INPUT_*`.
+    pub received: [u64; INPUTS],
+}
+
+layout! {
+    Health as "inekf.Health.v1", size 272, align 8 {
+        stamp_ns: 0, uptime_ns: 8, instance_pid: 16, state: 24, waiting_for: 28, model: 32,
+        flags: 36, last_imu_stamp_ns: 40, imu_rate_hz: 48, counters: 56, rejected_by_reason: 96,
+        received: 224,
+    }
+}

@@ -1,0 +1,30 @@
+//! Position fixes: world frame (east-north-up), metres.
+
+use iceoryx2::prelude::ZeroCopySend;
+use serde::{Deserialize, Serialize};
+
+use super::Header;
+use super::layout::layout;
+
+/// A measured position of one source (an antenna, say; its lever arm is in the daemon's configuration).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
+#[type_name("inekf.PositionFix.v1")]
+pub struct PositionFix {
+    /// Stamp, number and sender.
+    pub header: Header,
+    /// Id of the source, `0..MAX_SOURCES`.
+    pub source: u32,
+    /// 3, or 2: then z and its row and column of the covariance are ignored.
+    pub dimension: u32,
+    /// Position of the source, world frame, m.
+    pub position_w_m: [f64; 3],
+    /// Covariance of the position, world frame, m^2, row-major.
+    pub covariance_w_m2: [f64; 9],
+}
+
+layout! {
+    PositionFix as "inekf.PositionFix.v1", size 136, align 8 {
+        header: 0, source: 32, dimension: 36, position_w_m: 40, covariance_w_m2: 64,
+    }
+}

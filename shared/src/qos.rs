@@ -1,0 +1,92 @@
+//! Quality of service of every topic, in one place. iceoryx2's own defaults are small (a buffer of two), and the side
+//! that creates a service decides for both, so every opener asks for all of these.
+//!
+//! Every publish-subscribe topic overflows safely: a full buffer drops its oldest message. So no sender ever waits
+//! for a reader, and a reader sees its losses as gaps in `seq` or `estimate_seq`.
+
+use crate::topic::Topic;
+
+/// Processes (nodes) that may open one service at a time.
+pub const MAX_NODES: usize = 32;
+
+/// Messages that a publisher may have loaned and not yet sent: one loaned ahead and one on its way, and some slack.
+pub const MAX_LOANED: usize = 4;
+
+/// Messages that a subscriber may hold at a time.
+pub const MAX_BORROWED: usize = 8;
+
+/// Limits of a publish-subscribe topic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PubSubQos {
+    /// Messages that wait for a subscriber; one more drops the oldest.
+    pub buffer: usize,
+    /// Publishers at a time.
+    pub publishers: usize,
+    /// Subscribers at a time.
+    pub subscribers: usize,
+    /// Messages that a late subscriber still gets.
+    pub history: usize,
+}
+
+/// IMU and odometry: more than four seconds at 1 kHz.
+pub const PROPAGATION: PubSubQos = PubSubQos {
+    buffer: 4096,
+    publishers: 8,
+    subscribers: 4,
+    history: 0,
+};
+
+/// Position, velocity and heading.
+pub const AIDING: PubSubQos = PubSubQos {
+    buffer: 1024,
+    publishers: 8,
+    subscribers: 4,
+    history: 0,
+};
+
+/// Estimates. The second publisher is for a daemon that starts while a killed one's place is still to be cleaned up.
+pub const ESTIMATE: PubSubQos = PubSubQos {
+    buffer: 1024,
+    publishers: 2,
+    subscribers: 8,
+    history: 0,
+};
+
+/// Health: a late subscriber gets the last one at once.
+pub const HEALTH: PubSubQos = PubSubQos {
+    buffer: 8,
+    publishers: 2,
+    subscribers: 8,
+    history: 1,
+};
+
+/// Limits of the publish-subscribe topic `topic`; `None` for a topic of another kind.
+#[must_use]
+pub const fn pub_sub(topic: Topic) -> Option<PubSubQos> {
+    match topic {
+        Topic::Imu | Topic::Odometry2d | Topic::Odometry3d => Some(PROPAGATION),
+        Topic::Position | Topic::Velocity | Topic::Heading => Some(AIDING),
+        Topic::Estimate => Some(ESTIMATE),
+        Topic::Health => Some(HEALTH),
+        Topic::Latest | Topic::Control | Topic::Wake => None,
+    }
+}
+
+/// Servers of the control topic: one, so that a second daemon of an instance is found out.
+pub const CONTROL_SERVERS: usize = 1;
+/// Clients of the control topic at a time.
+pub const CONTROL_CLIENTS: usize = 8;
+/// Requests of one client that may be unanswered at a time.
+pub const CONTROL_PENDING: usize = 4;
+
+/// Readers of the newest estimate at a time. There is one writer.
+pub const LATEST_READERS: usize = 16;
+/// Key of the newest estimate on its blackboard.
+pub const LATEST_KEY: u32 = 0;
+
+/// Notifiers of the wake topic at a time.
+pub const WAKE_NOTIFIERS: usize = 32;
+/// Listeners of the wake topic at a time.
+pub const WAKE_LISTENERS: usize = 2;
+/// Largest event id of the wake topic. Only id 0 is used.
+pub const WAKE_MAX_EVENT: usize = 0;

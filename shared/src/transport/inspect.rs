@@ -1,0 +1,151 @@
+//! What lies in shared memory: nodes alive and dead, services left half made, files.
+//!
+//! For people and for cleaning up; no port is opened.
+
+use std::fs;
+use std::io;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use iceoryx2::node::{Node, NodeState, NodeView};
+use iceoryx2::prelude::{CallbackProgression, ipc};
+
+use super::{Config, TransportError};
+
+/// Where the system keeps shared memory.
+const SHARED_MEMORY: &str = "/dev/shm";
+/// Permissions of a service's description while it is being written; it is finished read-only.
+const BEING_WRITTEN: u32 = 0o600;
+/// A description is written within milliseconds: one that is older was left by a process that died.
+const ABANDONED_AFTER: Duration = Duration::from_secs(2);
+/// How long the clean-up of one dead node may take.
+const CLEANUP_WITHIN: Duration = Duration::from_secs(5);
+
+/// A process's access to shared memory, as others see it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NodeReport {
+    /// Name the process gave it; empty if its details cannot be read.
+    pub name: String,
+    /// Name of the program; empty if its details cannot be read.
+    pub program: String,
+    /// Process id; 0 if its details cannot be read.
+    pub process: u32,
+    /// Whether the process is alive.
+    pub alive: bool,
+}
+
+fn internal(cause: String) -> TransportError {
+    TransportError::Internal {
+        service: "the list of nodes".to_owned(),
+        cause,
+    }
+}
+
+fn each_node(
+    config: &Config,
+    mut take: impl FnMut(NodeState<ipc::Service>),
+) -> Result<(), TransportError> {
+    Node::<ipc::Service>::list(config, |state| {
+        take(state);
+        CallbackProgression::Continue
+    })
+    .map_err(|error| internal(format!("{error:?}")))
+}
+
+/// All nodes under `config`. Those of other users cannot be looked into and are left out.
+///
+/// # Errors
+/// [`TransportError::Internal`] if they cannot be listed.
+pub fn nodes(config: &Config) -> Result<Vec<NodeReport>, TransportError> {
+    let mut reports = Vec::new();
+    each_node(config, |state| {
+        let (details, alive) = match &state {
+            NodeState::Alive(view) => (view.details(), true),
+            NodeState::Dead(view) => (view.details(), false),
+            NodeState::Inaccessible(_) | NodeState::Undefined(_) => return,
+        };
+        reports.push(match details {
+            Some(details) => NodeReport {
+                name: details.name().to_string(),
+                program: details.executable().to_string(),
+                process: u32::try_from(details.process_id().value()).unwrap_or(0),
+                alive,
+            },
+            None => NodeReport {
+                name: String::new(),
+                program: String::new(),
+                process: 0,
+                alive,
+            },
+        });
+    })?;
+    Ok(reports)
+}
+
+/// Removes what dead nodes left. Returns how many were removed and how many could not be.
+///
+/// # Errors
+/// As [`nodes`].
+pub fn remove_dead_nodes(config: &Config) -> Result<(usize, usize), TransportError> {
+    let (mut removed, mut kept) = (0, 0);
+    each_node(config, |state| {
+        if let NodeState::Dead(view) = state {
+            match view.blocking_remove_stale_resources(CLEANUP_WITHIN) {
+                Ok(()) => removed += 1,
+                Err(_) => kept += 1,
+            }
+        }
+    })?;
+    Ok((removed, kept))
+}
+
+/// Descriptions of services that a process began to write and died over. iceoryx2 neither finishes
+/// nor removes them, and their services cannot be opened until they are gone.
+///
+/// # Errors
+/// The folder of services cannot be read.
+pub fn half_made_services(config: &Config) -> io::Result<Vec<PathBuf>> {
+    let folder = PathBuf::from(config.global.service_dir().to_string());
+    let mut found = Vec::new();
+    for (path, metadata) in files(&folder, &config.global.prefix.to_string())? {
+        let age = metadata.modified()?.elapsed().unwrap_or_default();
+        if metadata.permissions().mode() & 0o777 == BEING_WRITTEN && age > ABANDONED_AFTER {
+            found.push(path);
+        }
+    }
+    Ok(found)
+}
+
+/// The files in shared memory under `config`, with their sizes in bytes.
+///
+/// # Errors
+/// They cannot be listed.
+pub fn shared_memory_files(config: &Config) -> io::Result<Vec<(PathBuf, u64)>> {
+    let files = files(Path::new(SHARED_MEMORY), &config.global.prefix.to_string())?;
+    Ok(files
+        .into_iter()
+        .map(|(path, metadata)| (path, metadata.len()))
+        .collect())
+}
+
+/// The files of `folder` whose names start with `prefix`; none if there is no such folder.
+fn files(folder: &Path, prefix: &str) -> io::Result<Vec<(PathBuf, fs::Metadata)>> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries?,
+    };
+    let mut files = Vec::new();
+    for entry in entries {
+        let entry = entry?;
+        if entry.file_name().to_string_lossy().starts_with(prefix)
+            // A file that has gone meanwhile is no file of interest.
+            && let Ok(metadata) = entry.metadata()
+            && metadata.is_file()
+        {
+            files.push((entry.path(), metadata));
+        }
+    }
+    files.sort_by(|a, b| a.0.cmp(&b.0));
+    Ok(files)
+}

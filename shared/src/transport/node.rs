@@ -1,0 +1,160 @@
+//! Nodes, and where their files are.
+
+use core::ops::Deref;
+use std::env::{self, VarError};
+
+use iceoryx2::config::Config;
+use iceoryx2::prelude::{
+    CallbackProgression, FileName, NodeBuilder, NodeName, Path, SemanticString, SignalHandlingMode,
+    ipc,
+};
+
+use super::TransportError;
+
+type IpcNode = iceoryx2::node::Node<ipc::Service>;
+
+/// A process's (or thread's) access to shared memory; in use as iceoryx2's own node.
+///
+/// Drop it after the ports and services that were made from it: the last one of all processes then
+/// leaves no file in `/dev/shm`.
+#[derive(Debug)]
+pub struct Node {
+    node: IpcNode,
+    // After the node: fields are dropped in the order of their declaration.
+    _counter: NodeCounter,
+}
+
+impl Deref for Node {
+    type Target = IpcNode;
+
+    fn deref(&self) -> &IpcNode {
+        &self.node
+    }
+}
+
+/// iceoryx2's count of the nodes there ever were: a file of 16 bytes for each root and prefix, which
+/// it never removes. Removed when dropped, unless there is still a node.
+#[derive(Debug)]
+struct NodeCounter(Config);
+
+impl Drop for NodeCounter {
+    fn drop(&mut self) {
+        let mut in_use = false;
+        let listed = IpcNode::list(&self.0, |_| {
+            in_use = true;
+            CallbackProgression::Stop
+        });
+        if listed.is_ok() && !in_use {
+            // A file that is left is no failure: the next process counts on in it.
+            // SAFETY: asked is that no other process uses the same root and prefix, and no node was
+            // there a moment ago. One that comes now keeps the file mapped or makes a new one, and
+            // its id stays unique: the count is only a part of it, beside the process id and the
+            // time in nanoseconds.
+            let _ =
+                unsafe { iceoryx2::testing::remove_global_mgmt_segment::<ipc::Service>(&self.0) };
+        }
+    }
+}
+
+/// Environment variable: absolute directory of the files that describe nodes and services.
+pub const IPC_ROOT_VARIABLE: &str = "INEKF_IPC_ROOT";
+
+/// Environment variable: start of the names of all files.
+pub const IPC_PREFIX_VARIABLE: &str = "INEKF_IPC_PREFIX";
+
+/// Most bytes that root and prefix may have together. What wakes the daemon is a socket in the root, and the path of a
+/// socket has at most 107 bytes: root, `/`, prefix, an id of up to 39 digits, `.event`.
+pub const IPC_ROOT_AND_PREFIX_MAX_LEN: usize = 107 - 1 - 39 - 6;
+
+/// iceoryx2's configuration with its defaults but for `root` and `prefix`, where given.
+///
+/// # Errors
+/// [`TransportError::Setting`] if `root` is not an absolute path, `prefix` no start of a file name, or both together too
+/// long.
+pub fn config(root: Option<&str>, prefix: Option<&str>) -> Result<Config, TransportError> {
+    let refuse = |variable, value: Option<&str>, fault| TransportError::Setting {
+        variable,
+        value: value.unwrap_or_default().to_owned(),
+        fault,
+    };
+    let refuse_root = |fault| refuse(IPC_ROOT_VARIABLE, root, fault);
+    let refuse_prefix = |fault| refuse(IPC_PREFIX_VARIABLE, prefix, fault);
+    let mut config = Config::default();
+    // iceoryx2 panics over a path it cannot put together, so a long one must not get as far.
+    let root_len = root.map_or(config.global.root_path().len(), str::len);
+    let prefix_len = prefix.map_or(config.global.prefix.len(), str::len);
+    if root_len + prefix_len > IPC_ROOT_AND_PREFIX_MAX_LEN {
+        let fault = "is too long: root and prefix may have 61 bytes together";
+        return Err(match root {
+            Some(_) => refuse_root(fault),
+            None => refuse_prefix(fault),
+        });
+    }
+    if let Some(root) = root {
+        if !root.starts_with('/') {
+            return Err(refuse_root("must be an absolute path"));
+        }
+        let path =
+            Path::new(root.as_bytes()).map_err(|_| refuse_root("contains what a path must not"))?;
+        config.global.set_root_path(&path);
+    }
+    if let Some(prefix) = prefix {
+        config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|_| {
+            refuse_prefix("must be the start of a file name: not empty, without '/'")
+        })?;
+    }
+    Ok(config)
+}
+
+/// The configuration as the environment has it: see the [module](super).
+///
+/// # Errors
+/// [`TransportError::Setting`] if a variable is set to what cannot be used.
+pub fn config_from_env() -> Result<Config, TransportError> {
+    let read = |variable| match env::var(variable) {
+        Ok(value) => Ok(Some(value)),
+        Err(VarError::NotPresent) => Ok(None),
+        Err(VarError::NotUnicode(value)) => Err(TransportError::Setting {
+            variable,
+            value: value.to_string_lossy().into_owned(),
+            fault: "is not UTF-8",
+        }),
+    };
+    config(
+        read(IPC_ROOT_VARIABLE)?.as_deref(),
+        read(IPC_PREFIX_VARIABLE)?.as_deref(),
+    )
+}
+
+/// Creates a node where the environment says. `name` is for people who list the nodes.
+///
+/// # Errors
+/// As [`config_from_env`] and [`open_node_with`].
+pub fn open_node(name: &str) -> Result<Node, TransportError> {
+    open_node_with(name, &config_from_env()?)
+}
+
+/// Creates a node under `config`.
+///
+/// Signals are left alone: iceoryx2 would otherwise take over SIGINT and SIGTERM at the first wait.
+///
+/// # Errors
+/// [`TransportError::Node`].
+pub fn open_node_with(name: &str, config: &Config) -> Result<Node, TransportError> {
+    let refuse = |cause: String| TransportError::Node {
+        node: name.to_owned(),
+        root: config.global.root_path().to_string(),
+        cause,
+    };
+    let node_name = NodeName::new(name).map_err(|error| refuse(format!("{error:?}")))?;
+    let node = NodeBuilder::new()
+        .name(&node_name)
+        .config(config)
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<ipc::Service>()
+        .map_err(|error| refuse(format!("{error:?}")))?;
+    Ok(Node {
+        node,
+        _counter: NodeCounter(config.clone()),
+    })
+}

@@ -1,0 +1,391 @@
+//! Opens the services of an instance, each with its type and its limits.
+//!
+//! All but the newest estimate are opened or created by whoever comes first, so daemon and clients start in any
+//! order. The newest estimate is created by the daemon alone.
+
+use iceoryx2::prelude::{MessagingPattern, Service, ServiceName, ipc};
+use iceoryx2::service::builder::blackboard::BlackboardCreateError;
+use iceoryx2::service::static_config::message_type_details::TypeDetail;
+use iceoryx2::service::static_config::messaging_pattern::MessagingPattern as StaticPattern;
+
+use super::classify::{Classify, explain, retry};
+use super::service::{Control, Latest, PubSub, Wake};
+use super::{Node, TransportError};
+use crate::message::{
+    ControlRequest, ControlResponse, EstimateMessage, EstimateSe2, EstimateSe3, EstimateSe23,
+    Header, HeadingFix, Health, ImuSample, Message, Odometry2d, Odometry3d, PositionFix,
+    VelocityFix,
+};
+use crate::qos::{self, PubSubQos};
+use crate::topic::{Instance, Topic};
+
+/// A message that clients send to the daemon.
+pub trait InputMessage: Message {
+    /// The topic it is sent on.
+    const TOPIC: Topic;
+
+    /// When it was measured, and which one it is.
+    fn header(&self) -> &Header;
+}
+
+macro_rules! input_message {
+    ($($message:ty => $topic:ident),+ $(,)?) => {
+        $(impl InputMessage for $message {
+            const TOPIC: Topic = Topic::$topic;
+
+            fn header(&self) -> &Header {
+                &self.header
+            }
+        })+
+    };
+}
+
+input_message! {
+    ImuSample => Imu,
+    Odometry2d => Odometry2d,
+    Odometry3d => Odometry3d,
+    PositionFix => Position,
+    VelocityFix => Velocity,
+    HeadingFix => Heading,
+}
+
+/// All inputs of an instance.
+#[derive(Debug)]
+pub struct Inputs {
+    /// Inertial samples.
+    pub imu: PubSub<ImuSample>,
+    /// Planar odometry.
+    pub odometry2d: PubSub<Odometry2d>,
+    /// Spatial odometry.
+    pub odometry3d: PubSub<Odometry3d>,
+    /// Position fixes.
+    pub position: PubSub<PositionFix>,
+    /// Velocity fixes.
+    pub velocity: PubSub<VelocityFix>,
+    /// Heading fixes.
+    pub heading: PubSub<HeadingFix>,
+}
+
+/// Opens all inputs of an instance.
+///
+/// # Errors
+/// As [`input`], for the first that fails.
+pub fn inputs(node: &Node, instance: &Instance) -> Result<Inputs, TransportError> {
+    Ok(Inputs {
+        imu: input(node, instance)?,
+        odometry2d: input(node, instance)?,
+        odometry3d: input(node, instance)?,
+        position: input(node, instance)?,
+        velocity: input(node, instance)?,
+        heading: input(node, instance)?,
+    })
+}
+
+/// Opens one input of an instance.
+///
+/// # Errors
+/// [`TransportError`], naming the service.
+pub fn input<M: InputMessage>(
+    node: &Node,
+    instance: &Instance,
+) -> Result<PubSub<M>, TransportError> {
+    pub_sub(node, instance, M::TOPIC)
+}
+
+/// Opens the estimates of an instance. `E` must be the payload of the daemon's model ([`estimate_model`]).
+///
+/// # Errors
+/// [`TransportError::Incompatible`] if the instance uses another model, else as [`input`].
+pub fn estimate<E: EstimateMessage>(
+    node: &Node,
+    instance: &Instance,
+) -> Result<PubSub<E>, TransportError> {
+    pub_sub(node, instance, Topic::Estimate)
+}
+
+/// Opens the health of an instance.
+///
+/// # Errors
+/// As [`input`].
+pub fn health(node: &Node, instance: &Instance) -> Result<PubSub<Health>, TransportError> {
+    pub_sub(node, instance, Topic::Health)
+}
+
+/// The `MODEL_*` code whose estimates the instance carries; `None` if nobody has opened them yet, or if their type is
+/// none of this version.
+///
+/// # Errors
+/// [`TransportError::Internal`] if the service's description cannot be read.
+pub fn estimate_model(node: &Node, instance: &Instance) -> Result<Option<u32>, TransportError> {
+    let service = Topic::Estimate.service_name(instance);
+    let name = service_name(&service)?;
+    let details = ipc::Service::details(&name, node.config(), MessagingPattern::PublishSubscribe)
+        .map_err(|error| TransportError::Internal {
+        service,
+        cause: format!("{error:?}"),
+    })?;
+    let Some(details) = details else {
+        return Ok(None);
+    };
+    let StaticPattern::PublishSubscribe(config) = details.static_details.messaging_pattern() else {
+        return Ok(None);
+    };
+    Ok(
+        match config
+            .message_type_details()
+            .payload
+            .type_name()
+            .to_string()
+            .as_str()
+        {
+            EstimateSe23::TYPE_NAME => Some(EstimateSe23::MODEL),
+            EstimateSe3::TYPE_NAME => Some(EstimateSe3::MODEL),
+            EstimateSe2::TYPE_NAME => Some(EstimateSe2::MODEL),
+            _ => None,
+        },
+    )
+}
+
+fn pub_sub<M: Message>(
+    node: &Node,
+    instance: &Instance,
+    topic: Topic,
+) -> Result<PubSub<M>, TransportError> {
+    let service = topic.service_name(instance);
+    let name = service_name(&service)?;
+    let Some(qos) = qos::pub_sub(topic) else {
+        return Err(TransportError::Internal {
+            service,
+            cause: "not a publish-subscribe topic".to_owned(),
+        });
+    };
+    let PubSubQos {
+        buffer,
+        publishers,
+        subscribers,
+        history,
+    } = qos;
+    let open = || {
+        node.service_builder(&name)
+            .publish_subscribe::<M>()
+            .subscriber_max_buffer_size(buffer)
+            .subscriber_max_borrowed_samples(qos::MAX_BORROWED)
+            .max_publishers(publishers)
+            .max_subscribers(subscribers)
+            .history_size(history)
+            .max_nodes(qos::MAX_NODES)
+            .enable_safe_overflow(true)
+            .open_or_create()
+    };
+    let factory = retry(open).map_err(|error| {
+        refuse(
+            node,
+            error,
+            &name,
+            MessagingPattern::PublishSubscribe,
+            || describe::<M>(),
+        )
+    })?;
+    Ok(PubSub::new(service, qos, factory))
+}
+
+/// Opens the control of an instance.
+///
+/// # Errors
+/// As [`input`].
+pub fn control(node: &Node, instance: &Instance) -> Result<Control, TransportError> {
+    let service = Topic::Control.service_name(instance);
+    let name = service_name(&service)?;
+    let open = || {
+        node.service_builder(&name)
+            .request_response::<ControlRequest, ControlResponse>()
+            .max_servers(qos::CONTROL_SERVERS)
+            .max_clients(qos::CONTROL_CLIENTS)
+            .max_active_requests_per_client(qos::CONTROL_PENDING)
+            .max_loaned_requests(qos::CONTROL_PENDING)
+            .max_response_buffer_size(1)
+            .max_borrowed_responses_per_pending_response(1)
+            .max_nodes(qos::MAX_NODES)
+            // A client that has as many requests unanswered gets an error; none is dropped.
+            .enable_safe_overflow_for_requests(false)
+            .enable_safe_overflow_for_responses(false)
+            // A request is done even if its client has gone.
+            .enable_fire_and_forget_requests(true)
+            .open_or_create()
+    };
+    let factory = retry(open).map_err(|error| {
+        refuse(
+            node,
+            error,
+            &name,
+            MessagingPattern::RequestResponse,
+            || {
+                format!(
+                    "{} and {}",
+                    describe::<ControlRequest>(),
+                    describe::<ControlResponse>()
+                )
+            },
+        )
+    })?;
+    Ok(Control::new(service, factory))
+}
+
+/// Opens what wakes the daemon of an instance.
+///
+/// # Errors
+/// As [`input`].
+pub fn wake(node: &Node, instance: &Instance) -> Result<Wake, TransportError> {
+    let service = Topic::Wake.service_name(instance);
+    let name = service_name(&service)?;
+    let open = || {
+        node.service_builder(&name)
+            .event()
+            .max_notifiers(qos::WAKE_NOTIFIERS)
+            .max_listeners(qos::WAKE_LISTENERS)
+            .event_id_max_value(qos::WAKE_MAX_EVENT)
+            .max_nodes(qos::MAX_NODES)
+            .disable_deadline()
+            .disable_notifier_created_event()
+            .disable_notifier_dropped_event()
+            .disable_notifier_dead_event()
+            .open_or_create()
+    };
+    let factory = retry(open)
+        .map_err(|error| refuse(node, error, &name, MessagingPattern::Event, String::new))?;
+    Ok(Wake::new(service, factory))
+}
+
+/// Creates the newest estimate of an instance, for the daemon. `initial` is what a reader finds before the first
+/// estimate. If readers have kept it from an earlier daemon, it is taken over; it then holds that daemon's last estimate
+/// until the next write.
+///
+/// # Errors
+/// As [`input`].
+pub fn latest<E: EstimateMessage>(
+    node: &Node,
+    instance: &Instance,
+    initial: E,
+) -> Result<Latest<E>, TransportError> {
+    let service = Topic::Latest.service_name(instance);
+    let name = service_name(&service)?;
+    let create = || {
+        node.service_builder(&name)
+            .blackboard_creator::<u32>()
+            .add(qos::LATEST_KEY, initial)
+            .max_readers(qos::LATEST_READERS)
+            .max_nodes(qos::MAX_NODES)
+            .create()
+    };
+    match create() {
+        Ok(factory) => Ok(Latest::new(service, factory)),
+        Err(BlackboardCreateError::AlreadyExists) => open_latest(node, instance),
+        Err(_) => {
+            let factory = retry(create).map_err(|error| {
+                refuse(node, error, &name, MessagingPattern::Blackboard, || {
+                    describe::<E>()
+                })
+            })?;
+            Ok(Latest::new(service, factory))
+        }
+    }
+}
+
+/// Opens the newest estimate of an instance, for readers.
+///
+/// # Errors
+/// [`TransportError::Missing`] if no daemon of the instance has started yet, else as [`input`].
+pub fn open_latest<E: EstimateMessage>(
+    node: &Node,
+    instance: &Instance,
+) -> Result<Latest<E>, TransportError> {
+    let service = Topic::Latest.service_name(instance);
+    let name = service_name(&service)?;
+    let open = || {
+        node.service_builder(&name)
+            .blackboard_opener::<u32>()
+            .max_readers(qos::LATEST_READERS)
+            .max_nodes(qos::MAX_NODES)
+            .open()
+    };
+    let factory = retry(open).map_err(|error| {
+        refuse(node, error, &name, MessagingPattern::Blackboard, || {
+            describe::<E>()
+        })
+    })?;
+    Ok(Latest::new(service, factory))
+}
+
+fn service_name(service: &str) -> Result<ServiceName, TransportError> {
+    ServiceName::new(service).map_err(|error| TransportError::Internal {
+        service: service.to_owned(),
+        cause: format!("{error:?}"),
+    })
+}
+
+fn refuse<E: Classify>(
+    node: &Node,
+    error: E,
+    name: &ServiceName,
+    pattern: MessagingPattern,
+    ours: impl FnOnce() -> String,
+) -> TransportError {
+    explain(
+        error,
+        name.to_string(),
+        || (ours(), describe_existing(node, name, pattern)),
+        || holders(node, name, pattern),
+    )
+}
+
+/// Name, size and alignment of our message, in the form of [`describe_type`].
+fn describe<M: Message>() -> String {
+    format!(
+        "{} ({} bytes, aligned to {})",
+        M::TYPE_NAME,
+        size_of::<M>(),
+        align_of::<M>()
+    )
+}
+
+fn describe_type(detail: &TypeDetail) -> String {
+    format!(
+        "{} ({} bytes, aligned to {})",
+        detail.type_name(),
+        detail.size(),
+        detail.alignment()
+    )
+}
+
+fn describe_existing(node: &Node, name: &ServiceName, pattern: MessagingPattern) -> String {
+    let Ok(Some(details)) = ipc::Service::details(name, node.config(), pattern) else {
+        return "a type that could not be read".to_owned();
+    };
+    match details.static_details.messaging_pattern() {
+        StaticPattern::PublishSubscribe(config) => {
+            describe_type(&config.message_type_details().payload)
+        }
+        StaticPattern::RequestResponse(config) => format!(
+            "{} and {}",
+            describe_type(&config.request_message_type_details().payload),
+            describe_type(&config.response_message_type_details().payload)
+        ),
+        StaticPattern::Blackboard(config) => {
+            format!("the key {}", describe_type(config.type_details()))
+        }
+        _ => "no type".to_owned(),
+    }
+}
+
+/// Ids of the processes that have the service open.
+fn holders(node: &Node, name: &ServiceName, pattern: MessagingPattern) -> Vec<u32> {
+    let Ok(Some(details)) = ipc::Service::details(name, node.config(), pattern) else {
+        return Vec::new();
+    };
+    let nodes = details
+        .dynamic_details
+        .map(|dynamic| dynamic.nodes)
+        .unwrap_or_default();
+    let ids = nodes.iter().map(|state| *state.node_id());
+    super::service::process_ids(ids)
+}

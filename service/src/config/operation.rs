@@ -1,0 +1,113 @@
+//! `[late]`, `[health]`, `[runtime]`: how the daemon runs, whatever it estimates.
+
+use std::time::Duration;
+
+use super::choice::WaitMode;
+use super::interval::Interval;
+use super::section::Section;
+
+/// Measurements that arrive after later samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Late {
+    /// A fix this late is still fused, by replay; one that is later is counted and dropped, s.
+    pub window_s: f64,
+    /// How many samples the replay's ring buffer holds.
+    pub capacity: usize,
+}
+
+/// When the estimate is called degraded or stale, and how often that is published.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Health {
+    /// Without an accepted fix for this long the estimate is degraded, s of sensor time.
+    pub degraded_after_s: f64,
+    /// Without an IMU sample for this long the estimate is stale, s of wall clock.
+    pub stale_after_s: f64,
+    /// Time between two health messages, s.
+    pub period_s: f64,
+}
+
+/// The estimation thread.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Runtime {
+    /// How it waits for samples.
+    pub wait: WaitMode,
+    /// The upper bound of every wait, ms. Used with [`WaitMode::Event`]; short enough to stop in time.
+    pub event_timeout_ms: u32,
+}
+
+impl Late {
+    pub(super) fn read(late: &mut Section<'_, '_>) -> Self {
+        Self {
+            window_s: late.float("window_s", "s", Interval::closed(0.0, 60.0), 1.0),
+            capacity: late.integer("capacity", Some("samples"), 1..=65_536, 2048),
+        }
+    }
+
+    /// The window in nanoseconds of sensor time.
+    pub fn window_ns(&self) -> u64 {
+        nanoseconds(self.window_s)
+    }
+}
+
+impl Health {
+    pub(super) fn read(health: &mut Section<'_, '_>) -> Self {
+        let patience = Interval::above(0.0, 3600.0);
+        Self {
+            degraded_after_s: health.float("degraded_after_s", "s", patience, 5.0),
+            stale_after_s: health.float("stale_after_s", "s", patience, 0.5),
+            period_s: health.float("period_s", "s", Interval::closed(0.01, 3600.0), 1.0),
+        }
+    }
+
+    /// [`degraded_after_s`](Self::degraded_after_s) in nanoseconds of sensor time.
+    pub fn degraded_after_ns(&self) -> u64 {
+        nanoseconds(self.degraded_after_s)
+    }
+
+    /// [`stale_after_s`](Self::stale_after_s) in nanoseconds.
+    pub fn stale_after_ns(&self) -> u64 {
+        nanoseconds(self.stale_after_s)
+    }
+
+    /// [`period_s`](Self::period_s) in nanoseconds.
+    pub fn period_ns(&self) -> u64 {
+        nanoseconds(self.period_s)
+    }
+}
+
+impl Runtime {
+    pub(super) fn read(runtime: &mut Section<'_, '_>) -> Self {
+        Self {
+            wait: runtime.choice("wait", WaitMode::Event),
+            event_timeout_ms: runtime.integer("event_timeout_ms", Some("ms"), 1..=50, 10),
+        }
+    }
+
+    /// The upper bound of every wait.
+    pub fn event_timeout(&self) -> Duration {
+        Duration::from_millis(u64::from(self.event_timeout_ms))
+    }
+}
+
+/// A time in nanoseconds, to the nearest; the ranges above keep it far from overflow.
+pub(super) fn nanoseconds(seconds: f64) -> u64 {
+    (seconds * 1e9).round() as u64
+}
+
+impl Default for Late {
+    fn default() -> Self {
+        Section::defaults(Self::read)
+    }
+}
+
+impl Default for Health {
+    fn default() -> Self {
+        Section::defaults(Self::read)
+    }
+}
+
+impl Default for Runtime {
+    fn default() -> Self {
+        Section::defaults(Self::read)
+    }
+}

@@ -1,0 +1,110 @@
+//! `[[position_source]]`, `[[velocity_source]]`, `[[heading_source]]`: which aiding sensors are known.
+//!
+//! A kind that the file does not mention has one source, id 0, with the defaults; `velocity_source = []` before the
+//! first table says that there is none. Fixes from an unknown source are rejected and counted.
+
+use inekf_shared::message::MAX_SOURCES;
+
+use super::interval::Interval;
+use super::section::Section;
+
+/// A sensor of position fixes, such as a GNSS receiver.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PositionSource {
+    /// The id its fixes carry.
+    pub id: u32,
+    /// From the IMU to the antenna, body FLU, m.
+    pub lever_arm_m: [f64; 3],
+    /// Multiplies the standard deviations of its fixes.
+    pub sigma_scale: f64,
+}
+
+/// A sensor of velocity in the world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VelocitySource {
+    /// The id its fixes carry.
+    pub id: u32,
+    /// Multiplies the standard deviations of its fixes.
+    pub sigma_scale: f64,
+}
+
+/// A sensor of heading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeadingSource {
+    /// The id its fixes carry.
+    pub id: u32,
+    /// Multiplies the standard deviations of its fixes.
+    pub sigma_scale: f64,
+}
+
+impl PositionSource {
+    pub(super) fn read_all(root: &mut Section<'_, '_>) -> Vec<Self> {
+        root.sources("position_source", MAX_SOURCES, Self::read, |source| {
+            source.id
+        })
+    }
+
+    fn read(source: &mut Section<'_, '_>) -> Self {
+        Self {
+            id: id(source),
+            lever_arm_m: source.vector3("lever_arm_m", "m", Interval::closed(-1000.0, 1000.0)),
+            sigma_scale: sigma_scale(source),
+        }
+    }
+}
+
+impl VelocitySource {
+    pub(super) fn read_all(root: &mut Section<'_, '_>) -> Vec<Self> {
+        root.sources("velocity_source", MAX_SOURCES, Self::read, |source| {
+            source.id
+        })
+    }
+
+    fn read(source: &mut Section<'_, '_>) -> Self {
+        Self {
+            id: id(source),
+            sigma_scale: sigma_scale(source),
+        }
+    }
+}
+
+impl HeadingSource {
+    pub(super) fn read_all(root: &mut Section<'_, '_>) -> Vec<Self> {
+        root.sources("heading_source", MAX_SOURCES, Self::read, |source| {
+            source.id
+        })
+    }
+
+    fn read(source: &mut Section<'_, '_>) -> Self {
+        Self {
+            id: id(source),
+            sigma_scale: sigma_scale(source),
+        }
+    }
+}
+
+impl Default for PositionSource {
+    fn default() -> Self {
+        Section::defaults(Self::read)
+    }
+}
+
+impl Default for VelocitySource {
+    fn default() -> Self {
+        Section::defaults(Self::read)
+    }
+}
+
+impl Default for HeadingSource {
+    fn default() -> Self {
+        Section::defaults(Self::read)
+    }
+}
+
+fn id(source: &mut Section<'_, '_>) -> u32 {
+    source.integer("id", None, 0..=MAX_SOURCES as u32 - 1, 0)
+}
+
+fn sigma_scale(source: &mut Section<'_, '_>) -> f64 {
+    source.ratio("sigma_scale", Interval::above(0.0, 1000.0), 1.0)
+}

@@ -1,0 +1,51 @@
+//! Answers to control requests: reset, set state, snapshot, barrier.
+
+use inekf::filter::Side;
+use inekf::model::InertialState;
+use inekf_shared::message::{
+    CONTROL_BARRIER, CONTROL_OK, CONTROL_REFUSED, CONTROL_RESET, CONTROL_SET_STATE,
+    CONTROL_SNAPSHOT, ControlRequest, ControlResponse, StateVector, Zero,
+};
+
+use crate::engine::InertialEngine;
+
+/// Does what `request` asks, and answers. Whatever its bytes are, a refusal says why.
+///
+/// Every input that was sent before the request must have been given to `engine` already.
+pub fn answer<G: InertialState<D>, S: Side, const D: usize>(
+    engine: &mut InertialEngine<G, S, D>,
+    request: &ControlRequest,
+) -> ControlResponse {
+    let outcome = match request.kind {
+        CONTROL_RESET => {
+            engine.reset();
+            Ok(StateVector::ZERO)
+        }
+        CONTROL_SET_STATE => engine.set_state(&request.state).map(|()| StateVector::ZERO),
+        CONTROL_SNAPSHOT => engine
+            .snapshot()
+            .ok_or("there is no state yet: the daemon is not initialised"),
+        CONTROL_BARRIER => Ok(StateVector::ZERO),
+        _ => Err("the kind of request is unknown to this version"),
+    };
+    let (state_code, waiting_for) = engine.state();
+    let tally = engine.tally();
+    let mut response = ControlResponse {
+        request_id: request.request_id,
+        status: CONTROL_OK,
+        state_code,
+        waiting_for,
+        counters: tally.counters,
+        received: tally.received,
+        rejected_by_reason: tally.rejected_by_reason,
+        ..ControlResponse::ZERO
+    };
+    match outcome {
+        Ok(state) => response.state = state,
+        Err(reason) => {
+            response.status = CONTROL_REFUSED;
+            response.set_reason(reason);
+        }
+    }
+    response
+}

@@ -1,0 +1,12 @@
+//! The daemon: the engine between shared-memory ports.
+//!
+//! [`ports`] opens everything, [`mod@run`] is the estimation loop, [`control`] answers requests,
+//! [`watch`] keeps the health message and reports changes to the log.
+
+pub mod control;
+pub mod ports;
+pub mod run;
+pub mod watch;
+
+pub use ports::Ports;
+pub use run::run;

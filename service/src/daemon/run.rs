@@ -1,0 +1,155 @@
+//! The estimation loop: one thread, bounded waits, no allocation between a sample and its estimate.
+//!
+//! Order of work: motion samples first; before each, the fixes that are due by its stamp and were
+//! sent before it, while later ones stay in their queue (so what a sender gets does not depend on
+//! how far ahead it is); then late fixes that came alone; then requests, each after every input
+//! sent before it; then health.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+
+use anyhow::Context;
+use inekf::filter::Side;
+use inekf::model::InertialState;
+use inekf_shared::clock::monotonic_ns;
+use inekf_shared::message::{INPUT_IMU, INPUT_ODOMETRY_2D, INPUT_ODOMETRY_3D, REASON_WRONG_MODEL};
+
+use inekf_shared::transport::WakeListener;
+
+use super::control::answer;
+use super::ports::{EstimatePort, Inputs, Ports};
+use super::watch::{Moment, Watch};
+use crate::config::Config;
+use crate::engine::InertialEngine;
+use crate::engine::tally::Refusal;
+
+/// Empty looks at the inputs between two looks at the clock in spin mode.
+const SPINS_PER_LOOK: u32 = 64;
+
+/// Runs until `stop` is set.
+///
+/// # Errors
+/// A port that fails for good. What a sender wrote is never an error.
+pub fn run<G: InertialState<D>, S: Side, const D: usize>(
+    engine: &mut InertialEngine<G, S, D>,
+    ports: &mut Ports,
+    config: &Config,
+    stop: &AtomicBool,
+) -> anyhow::Result<()> {
+    let mut watch = Watch::new(
+        monotonic_ns(),
+        config.health.period_ns(),
+        config.health.stale_after_ns(),
+    );
+    let bound = config.runtime.event_timeout();
+    while !stop.load(Ordering::Relaxed) {
+        let samples = take_inputs(engine, &mut ports.inputs, &mut ports.estimates)?;
+        let now_ns = monotonic_ns();
+        if samples > 0 {
+            watch.arrival(now_ns);
+        }
+        answer_requests(engine, ports)?;
+        if watch.is_due(now_ns) {
+            report(engine, ports, &mut watch, now_ns);
+        }
+        if samples == 0 {
+            wait(ports.wake.as_ref(), bound)?;
+        }
+    }
+    Ok(())
+}
+
+/// Takes everything that has arrived and is due. Returns the number of motion samples.
+fn take_inputs<G: InertialState<D>, S: Side, const D: usize>(
+    engine: &mut InertialEngine<G, S, D>,
+    inputs: &mut Inputs,
+    outbox: &mut EstimatePort,
+) -> anyhow::Result<u32> {
+    let mut samples = 0;
+    while let Some(sample) = inputs.imu.receive().context("receiving from imu")? {
+        let received_ns = monotonic_ns();
+        take_fixes(engine, inputs, sample.header.stamp_ns, outbox)?;
+        engine.imu(&sample, received_ns, outbox);
+        samples += 1;
+    }
+    // Fixes that came after the samples they belong to; before the first sample none is due.
+    if let Some(now_ns) = engine.last_sample_ns() {
+        take_fixes(engine, inputs, now_ns, outbox)?;
+    }
+    Ok(samples)
+}
+
+/// Takes the fixes up to `horizon_ns`.
+fn take_fixes<G: InertialState<D>, S: Side, const D: usize>(
+    engine: &mut InertialEngine<G, S, D>,
+    inputs: &mut Inputs,
+    horizon_ns: u64,
+    outbox: &mut EstimatePort,
+) -> anyhow::Result<()> {
+    while let Some(fix) = inputs.position.next_until(horizon_ns)? {
+        engine.position(&fix, outbox);
+    }
+    while let Some(fix) = inputs.velocity.next_until(horizon_ns)? {
+        engine.velocity(&fix, outbox);
+    }
+    while let Some(fix) = inputs.heading.next_until(horizon_ns)? {
+        engine.heading(&fix, outbox);
+    }
+    Ok(())
+}
+
+fn answer_requests<G: InertialState<D>, S: Side, const D: usize>(
+    engine: &mut InertialEngine<G, S, D>,
+    ports: &mut Ports,
+) -> anyhow::Result<()> {
+    while let Some(request) = ports.control.receive().context("receiving a request")? {
+        take_inputs(engine, &mut ports.inputs, &mut ports.estimates)?;
+        // A client that is gone by now has nobody to be answered.
+        let _ = request.send_copy(answer(engine, &request));
+    }
+    Ok(())
+}
+
+/// Publishes health, and counts what no other loop looks at: odometry is not of this model.
+fn report<G: InertialState<D>, S: Side, const D: usize>(
+    engine: &mut InertialEngine<G, S, D>,
+    ports: &mut Ports,
+    watch: &mut Watch,
+    now_ns: u64,
+) {
+    let inputs = &ports.inputs;
+    while let Ok(Some(row)) = inputs.odometry2d.receive() {
+        engine.refuse(INPUT_ODOMETRY_2D, &row.header, Refusal(REASON_WRONG_MODEL));
+    }
+    while let Ok(Some(row)) = inputs.odometry3d.receive() {
+        engine.refuse(INPUT_ODOMETRY_3D, &row.header, Refusal(REASON_WRONG_MODEL));
+    }
+    let moment = Moment {
+        now_ns,
+        state: engine.state(),
+        last_sample_ns: engine.last_sample_ns().unwrap_or(0),
+        failures: ports.estimates.failures,
+    };
+    let arrivals = engine.tally().received[INPUT_IMU];
+    let health = watch.report(&moment, arrivals, engine.tally());
+    if let Ok(sample) = ports.health.loan_uninit() {
+        // Nobody has to listen.
+        let _ = sample.write_payload(health).send();
+    }
+}
+
+/// Waits for work: spinning, or for a wake-up but never longer than `bound`. Every wait is
+/// followed by a look at all inputs, so a lost wake-up costs at most the bound.
+fn wait(wake: Option<&WakeListener>, bound: Duration) -> anyhow::Result<()> {
+    match wake {
+        None => {
+            for _ in 0..SPINS_PER_LOOK {
+                core::hint::spin_loop();
+            }
+        }
+        Some(listener) => {
+            listener.wait(bound).context("waiting for a wake-up")?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,115 @@
+//! What the daemon says about itself: the health message, and changes of state in the log.
+//!
+//! Everything here runs once per period, never between a sample and its estimate.
+
+use inekf_shared::message::{
+    Health, MODEL_IMU, STATE_DEGRADED, STATE_RUNNING, STATE_STALE, state_name, waiting_for_name,
+};
+use tracing::{info, warn};
+
+use crate::engine::tally::Tally;
+
+/// What the loop knows at one moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// CLOCK_MONOTONIC, nanoseconds.
+    pub now_ns: u64,
+    /// `STATE_*` and `WAITING_FOR_*` of the engine.
+    pub state: (u32, u32),
+    /// Stamp of the last accepted sample, nanoseconds of the sensor clock.
+    pub last_sample_ns: u64,
+    /// Estimates that could not be published.
+    pub failures: u64,
+}
+
+/// Makes the health messages.
+#[derive(Debug)]
+pub struct Watch {
+    started_ns: u64,
+    period_ns: u64,
+    stale_after_ns: u64,
+    next_ns: u64,
+    last_arrival_ns: u64,
+    arrivals_at_last: u64,
+    said: (u32, u32),
+    failures_said: u64,
+}
+
+impl Watch {
+    /// A watch that starts at `now_ns` (CLOCK_MONOTONIC).
+    pub fn new(now_ns: u64, period_ns: u64, stale_after_ns: u64) -> Self {
+        Self {
+            started_ns: now_ns,
+            period_ns,
+            stale_after_ns,
+            next_ns: now_ns,
+            last_arrival_ns: now_ns,
+            arrivals_at_last: 0,
+            said: (0, 0),
+            failures_said: 0,
+        }
+    }
+
+    /// Notes that motion samples arrived at `now_ns`.
+    pub fn arrival(&mut self, now_ns: u64) {
+        self.last_arrival_ns = now_ns;
+    }
+
+    /// Whether a health message is due.
+    pub fn is_due(&self, now_ns: u64) -> bool {
+        now_ns >= self.next_ns
+    }
+
+    /// The health message of this moment; also logs what has changed since the last one.
+    pub fn report(&mut self, moment: &Moment, arrivals: u64, tally: &Tally) -> Health {
+        let elapsed_s = (moment.now_ns.saturating_sub(self.next_ns) + self.period_ns) as f64 * 1e-9;
+        let imu_rate_hz = (arrivals - self.arrivals_at_last) as f64 / elapsed_s;
+        self.arrivals_at_last = arrivals;
+        self.next_ns = moment.now_ns + self.period_ns;
+
+        let (mut state, waiting_for) = moment.state;
+        let silent = moment.now_ns.saturating_sub(self.last_arrival_ns) > self.stale_after_ns;
+        if silent && matches!(state, STATE_RUNNING | STATE_DEGRADED) {
+            state = STATE_STALE;
+        }
+        self.log((state, waiting_for), moment.failures, tally);
+        Health {
+            stamp_ns: moment.now_ns,
+            uptime_ns: moment.now_ns - self.started_ns,
+            instance_pid: u64::from(std::process::id()),
+            state,
+            waiting_for,
+            model: MODEL_IMU,
+            flags: 0,
+            last_imu_stamp_ns: moment.last_sample_ns,
+            imu_rate_hz,
+            counters: tally.counters,
+            rejected_by_reason: tally.rejected_by_reason,
+            received: tally.received,
+        }
+    }
+
+    fn log(&mut self, now: (u32, u32), failures: u64, tally: &Tally) {
+        if now != self.said {
+            let counters = tally.counters;
+            info!(
+                state = state_name(now.0),
+                waiting_for = waiting_for_name(now.1),
+                accepted = counters.accepted,
+                gated = counters.gated,
+                late = counters.late,
+                lost = counters.lost,
+                rejected = counters.rejected,
+                "state"
+            );
+            self.said = now;
+        }
+        if failures > self.failures_said {
+            warn!(
+                failures,
+                "estimates could not be published: is there space in /dev/shm?"
+            );
+            self.failures_said = failures;
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! `inekf-service`: the estimation daemon.
+
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use clap::{Parser, Subcommand};
+use inekf::filter::{Left, Side};
+use inekf::lie::SE23;
+use inekf::model::{InertialState, NavState};
+use inekf_service::config::{Config, Invariance};
+use inekf_service::daemon::{self, Ports};
+use inekf_service::engine::{InertialEngine, Settings};
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::{self, inspect};
+
+/// Invariant Kalman filtering over shared memory.
+///
+/// Takes IMU samples and position, velocity and heading fixes on the topics
+/// `inekf/INSTANCE/{imu,position,velocity,heading}`, publishes the estimate with its covariance on
+/// `inekf/INSTANCE/estimate` at IMU rate, and prints one line that starts with `ready` when its
+/// ports are open. SIGINT or SIGTERM stops it.
+#[derive(Parser)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    after_help = "\
+Examples:
+  inekf-service --config service/config/kitti00_car_a.toml
+  inekf-service --config my.toml --instance drone-7
+  inekf-service check my.toml
+  inekf-service doctor
+
+Every key of the configuration is described in service/CONFIG.md.
+Logging: set RUST_LOG, e.g. RUST_LOG=debug. Shared memory: INEKF_IPC_ROOT and INEKF_IPC_PREFIX
+keep a set of processes apart from others."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+    /// The configuration file (TOML).
+    #[arg(long, value_name = "FILE", required = true)]
+    config: Option<PathBuf>,
+    /// Name of this daemon; clients name the same one.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    instance: String,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Checks a configuration file and prints every fault in it.
+    Check {
+        /// The configuration file (TOML).
+        file: PathBuf,
+    },
+    /// Shows what lies in shared memory, and removes what dead processes left there.
+    Doctor,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = match (&arguments.command, &arguments.config) {
+        (Some(Command::Check { file }), _) => check(file),
+        (Some(Command::Doctor), _) => doctor(),
+        (None, Some(config)) => serve(config, &arguments.instance),
+        (None, None) => Err(anyhow::anyhow!("name a configuration with --config FILE")),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("inekf-service: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn check(file: &Path) -> anyhow::Result<()> {
+    let config = Config::load(file)?;
+    println!(
+        "{}: good: model {}, estimator {}, {} states",
+        file.display(),
+        config.model,
+        config.estimator,
+        if config.biases { 15 } else { 9 }
+    );
+    Ok(())
+}
+
+/// Lists and cleans. What is alive is never touched.
+fn doctor() -> anyhow::Result<()> {
+    let config = transport::config_from_env()?;
+    for node in inspect::nodes(&config)? {
+        let state = if node.alive { "alive" } else { "dead" };
+        println!(
+            "node     {state:<6} process {:<8} {} ({})",
+            node.process, node.name, node.program
+        );
+    }
+    let (removed, kept) = inspect::remove_dead_nodes(&config)?;
+    println!("removed  {removed} dead nodes; {kept} could not be removed");
+    for file in inspect::half_made_services(&config)? {
+        std::fs::remove_file(&file).with_context(|| format!("removing {}", file.display()))?;
+        println!("removed  {}, left half made", file.display());
+    }
+    let files = inspect::shared_memory_files(&config)?;
+    let bytes: u64 = files.iter().map(|(_, bytes)| bytes).sum();
+    println!(
+        "files    {} in shared memory, {:.1} MB",
+        files.len(),
+        bytes as f64 * 1e-6
+    );
+    Ok(())
+}
+
+fn serve(file: &Path, instance: &str) -> anyhow::Result<()> {
+    start_logging();
+    let instance = Instance::new(instance)?;
+    let config = Config::load(file)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let signalled = Arc::clone(&stop);
+    ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
+        .context("installing the handler of SIGINT and SIGTERM")?;
+    match (config.invariance, config.biases) {
+        (Invariance::Left, true) => run::<NavState, Left, 15>(&config, &instance, &stop),
+        (Invariance::Left, false) => run::<SE23, Left, 9>(&config, &instance, &stop),
+    }
+}
+
+fn run<G: InertialState<D>, S: Side, const D: usize>(
+    config: &Config,
+    instance: &Instance,
+    stop: &AtomicBool,
+) -> anyhow::Result<()> {
+    let mut engine = InertialEngine::<G, S, D>::new(Settings::new(config));
+    let mut ports = Ports::open(instance, config.runtime.wait)?;
+    let mut out = std::io::stdout();
+    writeln!(
+        out,
+        "ready: instance {instance}, process {}, model {}, {D} states, wait {}",
+        std::process::id(),
+        config.model,
+        config.runtime.wait,
+    )
+    .and_then(|()| out.flush())
+    .context("writing the ready line")?;
+    daemon::run(&mut engine, &mut ports, config, stop)
+}
+
+/// Logs to standard error: information by default, iceoryx2 only when it warns.
+fn start_logging() {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env()
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info,iceoryx2=error"));
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .init();
+}

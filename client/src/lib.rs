@@ -1,1 +1,29 @@
-//! inekf-client
+//! The client side of the estimation daemon: recorded and simulated data, and what becomes of it.
+//!
+//! The modules here need no daemon and no shared memory, and can be used alone:
+//!
+//! * [`dataset`] reads and writes dataset folders (CSV files and a `meta.json`) and merges them into one stream of events;
+//! * [`simulate`] makes such datasets: analytic trajectories, a MEMS IMU, position, velocity and heading fixes;
+//! * [`table`] reads and writes the estimate CSV, and holds the CSV reader both share;
+//! * [`evaluate`] compares estimates with the truth;
+//! * [`plot`] draws the comparison as SVG and assembles a report of one HTML file.
+//!
+//! Conventions everywhere: SI units and radians, world ENU, body FLU, quaternions Hamilton, body to world, stored
+//! `x, y, z, w`; stamps are `u64` nanoseconds of the sensor clock.
+
+pub mod control;
+pub mod daemon;
+pub mod dataset;
+pub mod demo;
+pub mod evaluate;
+pub mod feed;
+pub mod live;
+pub mod pace;
+pub mod plot;
+pub mod progress;
+pub mod read;
+pub mod replay;
+pub mod rows;
+pub mod session;
+pub mod simulate;
+pub mod table;

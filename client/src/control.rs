@@ -1,0 +1,154 @@
+//! Requests to a daemon: reset, set state, snapshot, barrier.
+
+use std::time::{Duration, Instant};
+
+use inekf_shared::message::{
+    CONTROL_BARRIER, CONTROL_OK, CONTROL_RESET, CONTROL_SET_STATE, CONTROL_SNAPSHOT,
+    ControlRequest, ControlResponse, StateVector, Zero, control_kind_name,
+};
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::{self, ControlClient, Node, TransportError, WakeNotifier};
+
+/// A request was not granted.
+#[derive(Debug, thiserror::Error)]
+pub enum ControlError {
+    /// The daemon said no.
+    #[error("the daemon refused the request `{request}`: {reason}")]
+    Refused {
+        /// What was asked.
+        request: &'static str,
+        /// Why not.
+        reason: String,
+    },
+    /// No answer came.
+    #[error("the daemon did not answer the request `{request}` within {seconds} s: is it running?")]
+    Silent {
+        /// What was asked.
+        request: &'static str,
+        /// How long was waited.
+        seconds: f64,
+    },
+    /// The request could not be sent, or the answer not be received.
+    #[error("the request `{request}` failed: {cause}")]
+    Failed {
+        /// What was asked.
+        request: &'static str,
+        /// iceoryx2's word for it.
+        cause: String,
+    },
+}
+
+/// Sends requests and waits for their answers.
+pub struct Controller {
+    client: ControlClient,
+    wake: WakeNotifier,
+    next_id: u64,
+    timeout: Duration,
+    _node: Node,
+}
+
+impl Controller {
+    /// A controller of `instance` that waits up to `timeout` for each answer.
+    ///
+    /// # Errors
+    /// [`TransportError`], naming the service and the remedy.
+    pub fn open(instance: &Instance, timeout: Duration) -> Result<Self, TransportError> {
+        Self::open_on(transport::open_node("inekf-control")?, instance, timeout)
+    }
+
+    /// The same on a node of one's own.
+    ///
+    /// # Errors
+    /// [`TransportError`], naming the service and the remedy.
+    pub fn open_on(
+        node: Node,
+        instance: &Instance,
+        timeout: Duration,
+    ) -> Result<Self, TransportError> {
+        Ok(Self {
+            client: transport::control(&node, instance)?.client()?,
+            wake: transport::wake(&node, instance)?.notifier()?,
+            next_id: 1,
+            timeout,
+            _node: node,
+        })
+    }
+
+    /// Forgets the state and initialises anew.
+    ///
+    /// # Errors
+    /// [`ControlError`].
+    pub fn reset(&mut self) -> Result<ControlResponse, ControlError> {
+        self.request(CONTROL_RESET, StateVector::ZERO)
+    }
+
+    /// Continues from `state`.
+    ///
+    /// # Errors
+    /// [`ControlError`].
+    pub fn set_state(&mut self, state: StateVector) -> Result<ControlResponse, ControlError> {
+        self.request(CONTROL_SET_STATE, state)
+    }
+
+    /// The current state with its covariance.
+    ///
+    /// # Errors
+    /// [`ControlError`].
+    pub fn snapshot(&mut self) -> Result<StateVector, ControlError> {
+        Ok(self.request(CONTROL_SNAPSHOT, StateVector::ZERO)?.state)
+    }
+
+    /// Returns when everything sent before has been processed; the answer has the counters.
+    ///
+    /// # Errors
+    /// [`ControlError`].
+    pub fn barrier(&mut self) -> Result<ControlResponse, ControlError> {
+        self.request(CONTROL_BARRIER, StateVector::ZERO)
+    }
+
+    fn request(&mut self, kind: u32, state: StateVector) -> Result<ControlResponse, ControlError> {
+        let request = control_kind_name(kind);
+        let failed = |cause: String| ControlError::Failed { request, cause };
+        let request_id = self.next_id;
+        self.next_id += 1;
+        let pending = self
+            .client
+            .send_copy(ControlRequest {
+                kind,
+                request_id,
+                state,
+                ..ControlRequest::ZERO
+            })
+            .map_err(|error| failed(error.to_string()))?;
+        let _ = self.wake.notify();
+        let started = Instant::now();
+        loop {
+            if let Some(response) = pending
+                .receive()
+                .map_err(|error| failed(error.to_string()))?
+            {
+                return if response.status == CONTROL_OK {
+                    Ok(*response)
+                } else {
+                    Err(ControlError::Refused {
+                        request,
+                        reason: response.reason().to_owned(),
+                    })
+                };
+            }
+            let waited = started.elapsed();
+            if waited > self.timeout {
+                return Err(ControlError::Silent {
+                    request,
+                    seconds: self.timeout.as_secs_f64(),
+                });
+            }
+            // Spin for what a running daemon needs, then leave the processor to others.
+            if waited > Duration::from_micros(200) {
+                std::thread::sleep(Duration::from_micros(100));
+            } else {
+                std::hint::spin_loop();
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! The rows of a dataset merged into one stream, in the order in which a daemon is to be fed.
+//!
+//! Order: by stamp; at one stamp position (by source), velocity, heading, IMU, odometry. Aiding
+//! comes first so that the daemon already holds a fix when the sample that reaches its stamp
+//! arrives. The order is a function of the dataset alone, so two replays feed the same sequence.
+
+use super::{
+    Dataset, HeadingRow, ImuRow, Odometry, Odometry2dRow, Odometry3dRow, PositionRow, VelocityRow,
+};
+
+/// One row of any kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// A position fix.
+    Position(PositionRow),
+    /// A velocity fix.
+    Velocity(VelocityRow),
+    /// A heading fix.
+    Heading(HeadingRow),
+    /// An IMU sample.
+    Imu(ImuRow),
+    /// A planar odometry increment.
+    Odometry2d(Odometry2dRow),
+    /// A spatial odometry increment.
+    Odometry3d(Odometry3dRow),
+}
+
+impl Event {
+    /// The row's stamp, ns.
+    pub fn stamp_ns(&self) -> u64 {
+        match self {
+            Self::Position(row) => row.stamp_ns,
+            Self::Velocity(row) => row.stamp_ns,
+            Self::Heading(row) => row.stamp_ns,
+            Self::Imu(row) => row.stamp_ns,
+            Self::Odometry2d(row) => row.stamp_ns,
+            Self::Odometry3d(row) => row.stamp_ns,
+        }
+    }
+
+    /// Whether it moves the state (IMU, odometry) rather than corrects it.
+    pub fn is_motion(&self) -> bool {
+        matches!(
+            self,
+            Self::Imu(_) | Self::Odometry2d(_) | Self::Odometry3d(_)
+        )
+    }
+}
+
+/// Iterator over a dataset's rows in feeding order; made by [`Dataset::events`].
+#[derive(Clone, Debug)]
+pub struct Events<'a> {
+    position: &'a [PositionRow],
+    velocity: &'a [VelocityRow],
+    heading: &'a [HeadingRow],
+    imu: &'a [ImuRow],
+    odometry2d: &'a [Odometry2dRow],
+    odometry3d: &'a [Odometry3dRow],
+}
+
+impl<'a> Events<'a> {
+    pub(super) fn new(dataset: &'a Dataset) -> Self {
+        let (odometry2d, odometry3d): (&[Odometry2dRow], &[Odometry3dRow]) = match &dataset.odometry
+        {
+            Odometry::None => (&[], &[]),
+            Odometry::Planar(rows) => (rows, &[]),
+            Odometry::Spatial(rows) => (&[], rows),
+        };
+        Self {
+            position: &dataset.position,
+            velocity: &dataset.velocity,
+            heading: &dataset.heading,
+            imu: &dataset.imu,
+            odometry2d,
+            odometry3d,
+        }
+    }
+
+    /// The next row of each stream, in the order that breaks ties.
+    fn heads(&self) -> [Option<Event>; 6] {
+        [
+            self.position.first().copied().map(Event::Position),
+            self.velocity.first().copied().map(Event::Velocity),
+            self.heading.first().copied().map(Event::Heading),
+            self.imu.first().copied().map(Event::Imu),
+            self.odometry2d.first().copied().map(Event::Odometry2d),
+            self.odometry3d.first().copied().map(Event::Odometry3d),
+        ]
+    }
+}
+
+impl Iterator for Events<'_> {
+    type Item = Event;
+
+    fn next(&mut self) -> Option<Event> {
+        // `min_by_key` keeps the first of equal keys.
+        let event = self
+            .heads()
+            .into_iter()
+            .flatten()
+            .min_by_key(Event::stamp_ns)?;
+        match event {
+            Event::Position(_) => self.position = &self.position[1..],
+            Event::Velocity(_) => self.velocity = &self.velocity[1..],
+            Event::Heading(_) => self.heading = &self.heading[1..],
+            Event::Imu(_) => self.imu = &self.imu[1..],
+            Event::Odometry2d(_) => self.odometry2d = &self.odometry2d[1..],
+            Event::Odometry3d(_) => self.odometry3d = &self.odometry3d[1..],
+        }
+        Some(event)
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let left = self.position.len()
+            + self.velocity.len()
+            + self.heading.len()
+            + self.imu.len()
+            + self.odometry2d.len()
+            + self.odometry3d.len();
+        (left, Some(left))
+    }
+}
+
+impl ExactSizeIterator for Events<'_> {}

@@ -1,0 +1,133 @@
+//! Dataset folders: recorded or simulated sensor data as CSV files and a `meta.json`.
+//!
+//! | file | columns |
+//! |---|---|
+//! | `imu.csv` | `t_ns,gx,gy,gz,ax,ay,az`: rad/s; specific force, m/s^2; body FLU |
+//! | `odometry.csv` | planar `t_ns,dtheta,dx,dy`, spatial `t_ns,rx,ry,rz,dx,dy,dz`: body motion since the previous row |
+//! | `position.csv` | `t_ns,x,y,z,sx,sy,sz[,source]`: world ENU, m, one sigma; `z` and `sz` empty in the plane |
+//! | `velocity.csv` | `t_ns,vx,vy,vz,sx,sy,sz[,source]`: world ENU, m/s, one sigma |
+//! | `heading.csv` | `t_ns,heading,sigma[,source]`: rad, counter-clockwise from east |
+//! | `truth.csv` | `t_ns,qw,qx,qy,qz,vx,vy,vz,x,y,z` (may add `bgx,bgy,bgz,bax,bay,baz`), or planar `t_ns,theta,x,y` |
+//! | `meta.json` | see [`Meta`] |
+//!
+//! One of `imu.csv` and `odometry.csv` is required, everything else is optional. Columns are found
+//! by name, others are ignored. `t_ns` is a whole number of nanoseconds of the sensor clock.
+
+mod events;
+mod load;
+mod meta;
+mod rows;
+mod save;
+
+use std::io;
+use std::path::PathBuf;
+
+pub use events::{Event, Events};
+pub use load::{LoadOptions, read_truth};
+pub use meta::{ImuNoise, Initial, Meta};
+pub use rows::{
+    HeadingRow, ImuBias, ImuRow, Odometry2dRow, Odometry3dRow, PositionRow, Truth2dRow, TruthRow,
+    VelocityRow,
+};
+
+use crate::table::Faults;
+
+/// A dataset in memory. Every list is sorted by stamp, fixes with one stamp by source; loading and
+/// simulating guarantee it, and [`Dataset::sort`] restores it after changes by hand.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Dataset {
+    /// What is known about the recording.
+    pub meta: Meta,
+    /// IMU samples.
+    pub imu: Vec<ImuRow>,
+    /// Wheel or visual odometry.
+    pub odometry: Odometry,
+    /// Position fixes of all sources.
+    pub position: Vec<PositionRow>,
+    /// Velocity fixes of all sources.
+    pub velocity: Vec<VelocityRow>,
+    /// Heading fixes of all sources.
+    pub heading: Vec<HeadingRow>,
+    /// The truth, if known.
+    pub truth: Truth,
+}
+
+/// Odometry rows, in the plane or in space.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Odometry {
+    /// The dataset has none.
+    #[default]
+    None,
+    /// Increments on SE(2).
+    Planar(Vec<Odometry2dRow>),
+    /// Increments on SE(3).
+    Spatial(Vec<Odometry3dRow>),
+}
+
+/// Truth rows, in the plane or in space.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Truth {
+    /// The dataset has none.
+    #[default]
+    None,
+    /// Poses on SE(2).
+    Planar(Vec<Truth2dRow>),
+    /// Attitude, velocity and position, perhaps biases.
+    Spatial(Vec<TruthRow>),
+}
+
+impl Dataset {
+    /// Sorts every list by stamp, and fixes with one stamp by source.
+    pub fn sort(&mut self) {
+        self.imu.sort_by_key(|row| row.stamp_ns);
+        match &mut self.odometry {
+            Odometry::None => {}
+            Odometry::Planar(rows) => rows.sort_by_key(|row| row.stamp_ns),
+            Odometry::Spatial(rows) => rows.sort_by_key(|row| row.stamp_ns),
+        }
+        self.position.sort_by_key(|row| (row.stamp_ns, row.source));
+        self.velocity.sort_by_key(|row| (row.stamp_ns, row.source));
+        self.heading.sort_by_key(|row| (row.stamp_ns, row.source));
+        match &mut self.truth {
+            Truth::None => {}
+            Truth::Planar(rows) => rows.sort_by_key(|row| row.stamp_ns),
+            Truth::Spatial(rows) => rows.sort_by_key(|row| row.stamp_ns),
+        }
+    }
+
+    /// All sensor rows in the order in which they are to be fed: by stamp, and at one stamp
+    /// position (by source), then velocity, then heading, then the IMU sample, then odometry, so
+    /// that a fix is there when the sample that reaches its stamp arrives.
+    pub fn events(&self) -> Events<'_> {
+        Events::new(self)
+    }
+}
+
+/// Why a dataset folder could not be read or written. `Display` is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// The folder is not there or cannot be read.
+    #[error("{}: {cause}; name a folder that holds imu.csv or odometry.csv", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+    /// A file cannot be opened or written.
+    #[error("{}: {cause}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
+    /// The files have faults; the list has all of them.
+    #[error("{}: {faults}", path.display())]
+    Faults {
+        /// The folder or file.
+        path: PathBuf,
+        /// What is wrong, where, and how to mend it.
+        faults: Faults,
+    },
+}

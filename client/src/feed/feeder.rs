@@ -1,0 +1,170 @@
+//! A feeder: the sending side of a user's own sensor process.
+//!
+//! ```no_run
+//! use inekf_client::dataset::ImuRow;
+//! use inekf_client::feed::Feeder;
+//! use inekf_shared::topic::Instance;
+//!
+//! let mut feeder = Feeder::open(&Instance::new("default")?)?;
+//! let receivers = feeder.imu(&ImuRow {
+//!     stamp_ns: 1_000_000,
+//!     gyro_rps: [0.0; 3],
+//!     accel_mps2: [0.0, 0.0, 9.81],
+//! })?;
+//! assert!(receivers > 0, "no daemon is listening");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use inekf_shared::clock::monotonic_ns;
+use inekf_shared::message::{
+    HeadingFix, ImuSample, Message, Odometry2d, Odometry3d, PositionFix, VelocityFix,
+};
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::{self, Node, Publisher, TransportError, WakeNotifier};
+
+use super::number::Numbering;
+use crate::dataset::{
+    Event, HeadingRow, ImuRow, Odometry2dRow, Odometry3dRow, PositionRow, VelocityRow,
+};
+
+/// A sample could not be sent.
+#[derive(Debug, thiserror::Error)]
+#[error("sending on the topic {topic}: {cause}; is there space in /dev/shm?")]
+pub struct SendError {
+    /// The topic.
+    pub topic: &'static str,
+    /// iceoryx2's word for it.
+    pub cause: String,
+}
+
+/// Numbers, stamps and sends samples of every kind to one daemon, and wakes it.
+///
+/// Every sending method returns the number of daemons that got the sample: 0 if none is there.
+/// Sending never waits.
+pub struct Feeder {
+    imu: Publisher<ImuSample>,
+    odometry2d: Publisher<Odometry2d>,
+    odometry3d: Publisher<Odometry3d>,
+    position: Publisher<PositionFix>,
+    velocity: Publisher<VelocityFix>,
+    heading: Publisher<HeadingFix>,
+    wake: WakeNotifier,
+    numbering: Numbering,
+    _node: Node,
+}
+
+impl Feeder {
+    /// A feeder of `instance`, whether its daemon runs already or not.
+    ///
+    /// # Errors
+    /// [`TransportError`], naming the service and the remedy.
+    pub fn open(instance: &Instance) -> Result<Self, TransportError> {
+        Self::open_on(transport::open_node("inekf-feeder")?, instance)
+    }
+
+    /// The same on a node of one's own.
+    ///
+    /// # Errors
+    /// [`TransportError`], naming the service and the remedy.
+    pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
+        let inputs = transport::inputs(&node, instance)?;
+        Ok(Self {
+            imu: inputs.imu.publisher()?,
+            odometry2d: inputs.odometry2d.publisher()?,
+            odometry3d: inputs.odometry3d.publisher()?,
+            position: inputs.position.publisher()?,
+            velocity: inputs.velocity.publisher()?,
+            heading: inputs.heading.publisher()?,
+            wake: transport::wake(&node, instance)?.notifier()?,
+            numbering: Numbering::new(monotonic_ns()),
+            _node: node,
+        })
+    }
+
+    /// Sends a row of any kind.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn send(&mut self, event: &Event) -> Result<usize, SendError> {
+        match event {
+            Event::Imu(row) => self.imu(row),
+            Event::Odometry2d(row) => self.odometry2d(row),
+            Event::Odometry3d(row) => self.odometry3d(row),
+            Event::Position(row) => self.position(row),
+            Event::Velocity(row) => self.velocity(row),
+            Event::Heading(row) => self.heading(row),
+        }
+    }
+
+    /// Sends an IMU sample.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn imu(&mut self, row: &ImuRow) -> Result<usize, SendError> {
+        let message = self.numbering.imu(row, monotonic_ns());
+        send(&self.imu, &self.wake, message, "imu")
+    }
+
+    /// Sends a planar odometry increment.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn odometry2d(&mut self, row: &Odometry2dRow) -> Result<usize, SendError> {
+        let message = self.numbering.odometry2d(row, monotonic_ns());
+        send(&self.odometry2d, &self.wake, message, "odometry2d")
+    }
+
+    /// Sends a spatial odometry increment.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn odometry3d(&mut self, row: &Odometry3dRow) -> Result<usize, SendError> {
+        let message = self.numbering.odometry3d(row, monotonic_ns());
+        send(&self.odometry3d, &self.wake, message, "odometry3d")
+    }
+
+    /// Sends a position fix.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn position(&mut self, row: &PositionRow) -> Result<usize, SendError> {
+        let message = self.numbering.position(row, monotonic_ns());
+        send(&self.position, &self.wake, message, "position")
+    }
+
+    /// Sends a velocity fix.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn velocity(&mut self, row: &VelocityRow) -> Result<usize, SendError> {
+        let message = self.numbering.velocity(row, monotonic_ns());
+        send(&self.velocity, &self.wake, message, "velocity")
+    }
+
+    /// Sends a heading fix.
+    ///
+    /// # Errors
+    /// [`SendError`].
+    pub fn heading(&mut self, row: &HeadingRow) -> Result<usize, SendError> {
+        let message = self.numbering.heading(row, monotonic_ns());
+        send(&self.heading, &self.wake, message, "heading")
+    }
+}
+
+fn send<M: Message>(
+    publisher: &Publisher<M>,
+    wake: &WakeNotifier,
+    message: M,
+    topic: &'static str,
+) -> Result<usize, SendError> {
+    let failed = |cause: String| SendError { topic, cause };
+    let receivers = publisher
+        .loan_uninit()
+        .map_err(|error| failed(error.to_string()))?
+        .write_payload(message)
+        .send()
+        .map_err(|error| failed(error.to_string()))?;
+    // A daemon that cannot be woken looks by itself within the bound of its wait.
+    let _ = wake.notify();
+    Ok(receivers)
+}

@@ -1,0 +1,134 @@
+//! Rows become messages: a header with stamp, number, time of sending and epoch.
+
+use inekf_shared::message::{
+    Header, HeadingFix, INPUT_HEADING, INPUT_IMU, INPUT_ODOMETRY_2D, INPUT_ODOMETRY_3D,
+    INPUT_POSITION, INPUT_VELOCITY, INPUTS, ImuSample, Odometry2d, Odometry3d, PositionFix,
+    VelocityFix, Zero,
+};
+
+use crate::dataset::{
+    Event, HeadingRow, ImuRow, Odometry2dRow, Odometry3dRow, PositionRow, VelocityRow,
+};
+
+/// Any input message, numbered and ready to send.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Input {
+    /// An IMU sample.
+    Imu(ImuSample),
+    /// A planar odometry increment.
+    Odometry2d(Odometry2d),
+    /// A spatial odometry increment.
+    Odometry3d(Odometry3d),
+    /// A position fix.
+    Position(PositionFix),
+    /// A velocity fix.
+    Velocity(VelocityFix),
+    /// A heading fix.
+    Heading(HeadingFix),
+}
+
+/// Numbers the messages of one sender, topic by topic, so that the daemon can count losses.
+#[derive(Clone, Debug)]
+pub struct Numbering {
+    epoch: u64,
+    next: [u64; INPUTS],
+}
+
+impl Numbering {
+    /// A new life of a sender; `epoch` tells it from its earlier lives (its start time will do).
+    pub fn new(epoch: u64) -> Self {
+        Self {
+            epoch,
+            next: [0; INPUTS],
+        }
+    }
+
+    /// The message for `event`, sent at `sent_ns` (CLOCK_MONOTONIC).
+    pub fn message(&mut self, event: &Event, sent_ns: u64) -> Input {
+        match event {
+            Event::Imu(row) => Input::Imu(self.imu(row, sent_ns)),
+            Event::Odometry2d(row) => Input::Odometry2d(self.odometry2d(row, sent_ns)),
+            Event::Odometry3d(row) => Input::Odometry3d(self.odometry3d(row, sent_ns)),
+            Event::Position(row) => Input::Position(self.position(row, sent_ns)),
+            Event::Velocity(row) => Input::Velocity(self.velocity(row, sent_ns)),
+            Event::Heading(row) => Input::Heading(self.heading(row, sent_ns)),
+        }
+    }
+
+    /// The message for an IMU sample.
+    pub fn imu(&mut self, row: &ImuRow, sent_ns: u64) -> ImuSample {
+        ImuSample {
+            header: self.header(INPUT_IMU, row.stamp_ns, sent_ns),
+            gyro_rps: row.gyro_rps,
+            accel_mps2: row.accel_mps2,
+        }
+    }
+
+    /// The message for a planar odometry increment.
+    pub fn odometry2d(&mut self, row: &Odometry2dRow, sent_ns: u64) -> Odometry2d {
+        Odometry2d {
+            header: self.header(INPUT_ODOMETRY_2D, row.stamp_ns, sent_ns),
+            dtheta_rad: row.dtheta_rad,
+            translation_m: row.translation_m,
+        }
+    }
+
+    /// The message for a spatial odometry increment.
+    pub fn odometry3d(&mut self, row: &Odometry3dRow, sent_ns: u64) -> Odometry3d {
+        Odometry3d {
+            header: self.header(INPUT_ODOMETRY_3D, row.stamp_ns, sent_ns),
+            rotation_rad: row.rotation_rad,
+            translation_m: row.translation_m,
+        }
+    }
+
+    /// The message for a position fix.
+    pub fn position(&mut self, row: &PositionRow, sent_ns: u64) -> PositionFix {
+        PositionFix {
+            header: self.header(INPUT_POSITION, row.stamp_ns, sent_ns),
+            source: row.source,
+            dimension: row.dimension,
+            position_w_m: row.position_w_m,
+            covariance_w_m2: diagonal(row.sigma_m),
+        }
+    }
+
+    /// The message for a velocity fix.
+    pub fn velocity(&mut self, row: &VelocityRow, sent_ns: u64) -> VelocityFix {
+        VelocityFix {
+            header: self.header(INPUT_VELOCITY, row.stamp_ns, sent_ns),
+            source: row.source,
+            velocity_w_mps: row.velocity_w_mps,
+            covariance_w: diagonal(row.sigma_mps),
+            ..VelocityFix::ZERO
+        }
+    }
+
+    /// The message for a heading fix.
+    pub fn heading(&mut self, row: &HeadingRow, sent_ns: u64) -> HeadingFix {
+        HeadingFix {
+            header: self.header(INPUT_HEADING, row.stamp_ns, sent_ns),
+            source: row.source,
+            heading_rad: row.heading_rad,
+            sigma_rad: row.sigma_rad,
+            ..HeadingFix::ZERO
+        }
+    }
+
+    fn header(&mut self, input: usize, stamp_ns: u64, sent_ns: u64) -> Header {
+        let seq = self.next[input];
+        self.next[input] += 1;
+        Header {
+            stamp_ns,
+            seq,
+            sent_ns,
+            epoch: self.epoch,
+        }
+    }
+}
+
+/// The row-major covariance of independent axes.
+fn diagonal(sigma: [f64; 3]) -> [f64; 9] {
+    let [x, y, z] = sigma.map(|s| s * s);
+    [x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z]
+}

@@ -1,0 +1,225 @@
+//! `inekf-client`: simulates, replays and shows what the estimation daemon makes of it.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use clap::{Args, Parser, Subcommand};
+use inekf_client::dataset::{Dataset, Truth};
+use inekf_client::demo::{DemoOptions, demo};
+use inekf_client::live::feed_live;
+use inekf_client::pace::Speed;
+use inekf_client::replay::{ReplayOptions, replay};
+use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+use inekf_shared::message::{Counters, reason_name};
+use inekf_shared::topic::Instance;
+
+/// Feeds, replays and measures the estimation daemon `inekf-service`.
+#[derive(Parser)]
+#[command(
+    version,
+    after_help = "\
+Examples:
+  inekf-client demo
+  inekf-client simulate road-circuit --save circuit
+  inekf-client replay circuit --config my.toml --speed max --out estimate.csv
+  inekf-client simulate drone-loops --instance drone-7
+
+Exit status: 0 done, 1 failed (one line says why), 2 wrong usage."
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Starts a daemon, simulates a drive at IMU rate, prints error and latency, writes a report.
+    Demo(DemoArguments),
+    /// Feeds a simulated drive or flight to a daemon in real time, or saves it as a dataset folder.
+    Simulate(SimulateArguments),
+    /// Feeds a dataset folder to a daemon and writes its estimates as CSV.
+    Replay(ReplayArguments),
+}
+
+#[derive(Args)]
+struct DemoArguments {
+    /// What is driven: road-circuit, drone-loops or stand-then-drive.
+    #[arg(long, default_value = "road-circuit")]
+    scenario: Scenario,
+    /// Seed of the sensors' noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// IMU rate, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 500.0)]
+    rate: f64,
+    /// Length of the drive, s.
+    #[arg(long, value_name = "S", default_value_t = 30.0)]
+    duration: f64,
+    /// Folder for the report and its plots.
+    #[arg(long, value_name = "DIR", default_value = "demo-report")]
+    out: PathBuf,
+    /// Not used: the demo starts a daemon on an instance of its own.
+    #[arg(long, value_name = "NAME", hide = true)]
+    instance: Option<String>,
+}
+
+#[derive(Args)]
+struct SimulateArguments {
+    /// road-circuit: a car on a circuit with bends and slopes; drone-loops: a drone in figures of
+    /// eight, banked; stand-then-drive: a car that stands for 15 s and drives off.
+    scenario: Scenario,
+    /// The daemon to feed.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    instance: Instance,
+    /// Seed of the sensors' noise: the same seed gives the same bytes.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// IMU rate, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 200.0)]
+    rate: f64,
+    /// Length, s.
+    #[arg(long, value_name = "S", default_value_t = 60.0)]
+    duration: f64,
+    /// Write a dataset folder instead of feeding.
+    #[arg(long, value_name = "DIR")]
+    save: Option<PathBuf>,
+    /// Feed as well as save.
+    #[arg(long, requires = "save")]
+    feed: bool,
+}
+
+#[derive(Args)]
+struct ReplayArguments {
+    /// The dataset folder: imu.csv, and position.csv, velocity.csv, heading.csv, meta.json if any.
+    dir: PathBuf,
+    /// Start a daemon with this configuration, and stop it afterwards.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Times real time, or max: as fast as the daemon takes it, losing nothing.
+    #[arg(long, value_name = "X|max", default_value = "max")]
+    speed: Speed,
+    /// The estimate CSV to write.
+    #[arg(long, value_name = "FILE.csv")]
+    out: PathBuf,
+    /// Write the covariance as well: the upper triangle, row by row.
+    #[arg(long)]
+    covariance: bool,
+    /// Without --config: the daemon to feed.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    instance: Instance,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = match arguments.command {
+        Command::Demo(arguments) => run_demo(arguments),
+        Command::Simulate(arguments) => run_simulate(arguments),
+        Command::Replay(arguments) => run_replay(arguments),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("inekf-client: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run_demo(arguments: DemoArguments) -> anyhow::Result<()> {
+    demo(&DemoOptions {
+        scenario: arguments.scenario,
+        seed: arguments.seed,
+        rate_hz: arguments.rate,
+        duration_s: arguments.duration,
+        out: arguments.out,
+    })
+}
+
+fn run_simulate(arguments: SimulateArguments) -> anyhow::Result<()> {
+    let instance = arguments.instance;
+    let dataset = simulate(
+        arguments.scenario,
+        &SimulationOptions {
+            seed: arguments.seed,
+            imu_rate_hz: arguments.rate,
+            duration_s: arguments.duration,
+            ..SimulationOptions::default()
+        },
+    )?;
+    if let Some(dir) = &arguments.save {
+        dataset.save(dir)?;
+        println!("saved    {}: {}", dir.display(), contents(&dataset));
+        if !arguments.feed {
+            return Ok(());
+        }
+    }
+    let stop = Arc::new(AtomicBool::new(false));
+    let signalled = Arc::clone(&stop);
+    ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
+        .context("installing the handler of SIGINT and SIGTERM")?;
+    let summary = feed_live(&dataset, &instance, &|| stop.load(Ordering::Relaxed))?;
+    println!(
+        "fed      {} samples to {instance}; {} with no daemon there to hear them",
+        summary.sent, summary.unheard
+    );
+    Ok(())
+}
+
+fn contents(dataset: &Dataset) -> String {
+    let truth = match &dataset.truth {
+        Truth::None => 0,
+        Truth::Planar(rows) => rows.len(),
+        Truth::Spatial(rows) => rows.len(),
+    };
+    format!(
+        "{} IMU samples, {} position fixes, {truth} rows of truth",
+        dataset.imu.len(),
+        dataset.position.len()
+    )
+}
+
+fn run_replay(arguments: ReplayArguments) -> anyhow::Result<()> {
+    let options = ReplayOptions {
+        dir: arguments.dir,
+        config: arguments.config,
+        speed: arguments.speed,
+        out: arguments.out,
+        covariance: arguments.covariance,
+        instance: arguments.instance,
+    };
+    let summary = replay(&options)?;
+    let seconds = summary.took.as_secs_f64();
+    println!(
+        "replayed {} samples in {seconds:.2} s ({:.0} per second): {} estimates in {}",
+        summary.sent,
+        summary.sent as f64 / seconds,
+        summary.rows,
+        options.out.display()
+    );
+    let Counters {
+        accepted,
+        gated,
+        late,
+        lost,
+        rejected,
+    } = summary.last.counters;
+    println!("fixes    {accepted} accepted, {gated} gated, {late} late; {lost} lost");
+    if rejected > 0 {
+        let reasons: Vec<String> = summary
+            .last
+            .rejected_by_reason
+            .iter()
+            .enumerate()
+            .filter(|(_, count)| **count > 0)
+            .map(|(code, count)| {
+                let reason = reason_name(u32::try_from(code).unwrap_or(u32::MAX));
+                format!("{count} {reason}")
+            })
+            .collect();
+        println!("rejected {rejected}: {}", reasons.join(", "));
+    }
+    Ok(())
+}

@@ -1,0 +1,77 @@
+//! Keeping time: real time, faster or slower, or as fast as it goes.
+
+use std::fmt;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+/// How fast recorded time passes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Speed {
+    /// This many times real time.
+    Times(f64),
+    /// As fast as the daemon takes it, without losing a sample.
+    Max,
+}
+
+impl FromStr for Speed {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "max" {
+            return Ok(Self::Max);
+        }
+        match text.parse::<f64>() {
+            Ok(times) if times.is_finite() && times > 0.0 && times <= 1e6 => Ok(Self::Times(times)),
+            _ => Err("a number of times real time, such as 1 or 0.5, or max".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for Speed {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Times(times) => write!(formatter, "{times}"),
+            Self::Max => formatter.write_str("max"),
+        }
+    }
+}
+
+/// The last stretch before a deadline is spun, for sleeping overshoots.
+const SPUN: Duration = Duration::from_micros(150);
+
+/// Maps stamps to deadlines on this machine's clock.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    start: Instant,
+    first_ns: u64,
+    times: f64,
+}
+
+impl Pace {
+    /// A pace at which the stamp `first_ns` is now.
+    pub fn new(first_ns: u64, times: f64) -> Self {
+        Self {
+            start: Instant::now(),
+            first_ns,
+            times,
+        }
+    }
+
+    /// When `stamp_ns` is due.
+    pub fn deadline(&self, stamp_ns: u64) -> Instant {
+        let ahead_s = stamp_ns.saturating_sub(self.first_ns) as f64 * 1e-9 / self.times;
+        self.start + Duration::from_secs_f64(ahead_s)
+    }
+
+    /// Waits until `stamp_ns` is due, asleep for most of it.
+    pub fn wait(&self, stamp_ns: u64) {
+        let deadline = self.deadline(stamp_ns);
+        let ahead = deadline.saturating_duration_since(Instant::now());
+        if ahead > SPUN {
+            std::thread::sleep(ahead - SPUN);
+        }
+        while Instant::now() < deadline {
+            std::hint::spin_loop();
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Replaying a dataset folder through a daemon: `inekf-client replay`.
+//!
+//! At full speed a bounded number of samples is in flight and none is lost; the daemon's estimates
+//! depend on the data and the configuration alone, so the output is the same bytes every time.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use inekf_shared::message::{ControlResponse, EstimateSe23};
+use inekf_shared::topic::Instance;
+
+use crate::daemon::{Daemon, private_instance};
+use crate::dataset::{Dataset, Odometry};
+use crate::pace::{Pace, Speed};
+use crate::progress::Progress;
+use crate::rows::{RowBuilder, state, triangle};
+use crate::session::{Session, why_no_estimate};
+use crate::table::{EstimateWriter, Layout};
+
+/// What to replay, and how.
+#[derive(Clone, Debug)]
+pub struct ReplayOptions {
+    /// The dataset folder.
+    pub dir: PathBuf,
+    /// Configuration of a daemon of one's own; without it the daemon of `instance` is fed.
+    pub config: Option<PathBuf>,
+    /// How fast.
+    pub speed: Speed,
+    /// The estimate CSV to write.
+    pub out: PathBuf,
+    /// Whether it has the covariance.
+    pub covariance: bool,
+    /// The daemon to feed if none is started.
+    pub instance: Instance,
+}
+
+/// What a replay did.
+#[derive(Clone, Copy, Debug)]
+pub struct ReplaySummary {
+    /// Rows of sensors sent.
+    pub sent: usize,
+    /// Rows written.
+    pub rows: usize,
+    /// How long the feeding took.
+    pub took: Duration,
+    /// The daemon's counters at the end.
+    pub last: ControlResponse,
+}
+
+/// Replays.
+///
+/// # Errors
+/// The data cannot be read, the daemon not be started or reached, an estimate was lost, or none
+/// came; the error says which.
+pub fn replay(options: &ReplayOptions) -> anyhow::Result<ReplaySummary> {
+    let dataset = Dataset::load(&options.dir)?;
+    if dataset.imu.is_empty() {
+        bail!(
+            "{} has no imu.csv; this version estimates from an IMU only{}",
+            options.dir.display(),
+            match dataset.odometry {
+                Odometry::None => "",
+                _ => " (its odometry is not used)",
+            }
+        );
+    }
+    let (daemon, instance) = match &options.config {
+        Some(config) => {
+            let instance = private_instance("replay")?;
+            (Some(Daemon::start(config, &instance)?), instance)
+        }
+        None => (None, options.instance.clone()),
+    };
+    let summary = feed(&dataset, &instance, options);
+    // Stop the daemon in either case; the first error is the one to report.
+    let stopped = daemon.map_or(Ok(()), Daemon::stop);
+    let summary = summary?;
+    stopped?;
+    Ok(summary)
+}
+
+fn feed(
+    dataset: &Dataset,
+    instance: &Instance,
+    options: &ReplayOptions,
+) -> anyhow::Result<ReplaySummary> {
+    let mut session = Session::open(instance)?;
+    session.set_initial(&dataset.meta)?;
+    let mut output = Output::new(&options.out, options.covariance)?;
+    let events = dataset.events();
+    let progress = Progress::new("replaying", events.len());
+    let pace = match options.speed {
+        Speed::Times(times) => Some(Pace::new(dataset.imu[0].stamp_ns, times)),
+        Speed::Max => None,
+    };
+
+    let started = Instant::now();
+    let mut sent = 0;
+    for event in events {
+        match &pace {
+            None => session.send_lossless(&event, &mut |estimate| output.take(&estimate))?,
+            Some(pace) => {
+                pace.wait(event.stamp_ns());
+                session.send(&event)?;
+                session.take_estimates(&mut |estimate| output.take(&estimate))?;
+            }
+        }
+        sent += 1;
+        progress.advance(sent);
+    }
+    let last = session.settle(&mut |estimate| output.take(&estimate))?;
+    let took = started.elapsed();
+    progress.finish();
+    let rows = output.finish()?;
+    if rows == 0 {
+        bail!("no estimate came: {}", why_no_estimate(&last));
+    }
+    Ok(ReplaySummary {
+        sent,
+        rows,
+        took,
+        last,
+    })
+}
+
+/// The estimate CSV under construction. Its header needs the dimension of the first estimate.
+struct Output {
+    path: PathBuf,
+    covariance: bool,
+    builder: RowBuilder,
+    writer: Option<EstimateWriter<BufWriter<File>>>,
+    file: Option<File>,
+    rows: usize,
+}
+
+impl Output {
+    fn new(path: &Path, covariance: bool) -> anyhow::Result<Self> {
+        let file = File::create(path).with_context(|| format!("creating {}", path.display()))?;
+        Ok(Self {
+            path: path.to_owned(),
+            covariance,
+            builder: RowBuilder::default(),
+            writer: None,
+            file: Some(file),
+            rows: 0,
+        })
+    }
+
+    fn take(&mut self, estimate: &EstimateSe23) -> anyhow::Result<()> {
+        match self.builder.push(*estimate) {
+            Some(complete) => self.write(&complete),
+            None => Ok(()),
+        }
+    }
+
+    fn write(&mut self, estimate: &EstimateSe23) -> anyhow::Result<()> {
+        let triangle = if self.covariance {
+            triangle(estimate)
+        } else {
+            &[]
+        };
+        let writing = || format!("writing {}", self.path.display());
+        if let Some(file) = self.file.take() {
+            let dimension = self.covariance.then_some(estimate.head.dimension as usize);
+            self.writer = Some(
+                EstimateWriter::new(BufWriter::new(file), Layout::Navigation, dimension)
+                    .with_context(writing)?,
+            );
+        }
+        if let Some(writer) = &mut self.writer {
+            writer
+                .write(estimate.head.stamp_ns, &state(estimate), triangle)
+                .with_context(writing)?;
+            self.rows += 1;
+        }
+        Ok(())
+    }
+
+    /// Writes the last row and returns how many there are.
+    fn finish(mut self) -> anyhow::Result<usize> {
+        if let Some(last) = std::mem::take(&mut self.builder).finish() {
+            self.write(&last)?;
+        }
+        if let Some(writer) = self.writer {
+            writer
+                .finish()
+                .with_context(|| format!("writing {}", self.path.display()))?;
+        }
+        Ok(self.rows)
+    }
+}

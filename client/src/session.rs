@@ -1,0 +1,207 @@
+//! One client's whole conversation with a daemon: feeding, reading and requesting.
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use inekf_shared::message::{
+    ControlResponse, EstimateSe23, MODEL_IMU, STATE_ALIGNING, STATE_WAITING, StateVector, Zero,
+    reason_name, state_name, triangle_index, waiting_for_name,
+};
+use inekf_shared::topic::Instance;
+
+use crate::control::Controller;
+use crate::dataset::{Event, Initial, Meta};
+use crate::feed::Feeder;
+use crate::read::EstimateReader;
+
+/// How long a daemon may take to answer.
+const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+/// Inputs in flight at most when nothing may be lost: each may give two estimates, and the
+/// reader's buffer holds 1024.
+const IN_FLIGHT: usize = 256;
+/// And at most this long a stretch of data: the daemon holds back a fix that is ahead of the
+/// samples, but not one so far ahead that its clock seems wrong.
+const IN_FLIGHT_NS: u64 = 10_000_000_000;
+
+/// Ports of every kind to one daemon.
+pub struct Session {
+    feeder: Feeder,
+    reader: EstimateReader,
+    controller: Controller,
+    in_flight: usize,
+    settled_ns: u64,
+}
+
+impl Session {
+    /// Opens all ports to `instance` and checks that its daemon answers.
+    ///
+    /// # Errors
+    /// A port cannot be opened, or no daemon answers.
+    pub fn open(instance: &Instance) -> anyhow::Result<Self> {
+        let mut controller = Controller::open(instance, ANSWER_WITHIN)?;
+        let reader = EstimateReader::open(instance)?;
+        let feeder = Feeder::open(instance)?;
+        controller
+            .barrier()
+            .with_context(|| format!("no daemon of instance {instance} is running"))?;
+        Ok(Self {
+            feeder,
+            reader,
+            controller,
+            in_flight: 0,
+            settled_ns: 0,
+        })
+    }
+
+    /// Sets the daemon's state to the one the dataset starts from, if it names one.
+    ///
+    /// # Errors
+    /// The state is not one of the IMU model, or the daemon refuses it.
+    pub fn set_initial(&mut self, meta: &Meta) -> anyhow::Result<()> {
+        if let Some(initial) = &meta.initial {
+            let state = state_vector(initial, meta.p0_diag.as_deref())?;
+            self.controller.set_state(state)?;
+        }
+        Ok(())
+    }
+
+    /// Sends one row. Never waits.
+    ///
+    /// # Errors
+    /// It cannot be sent, or no daemon is there to get it.
+    pub fn send(&mut self, event: &Event) -> anyhow::Result<()> {
+        if self.feeder.send(event)? == 0 {
+            bail!("the daemon has gone: it no longer listens");
+        }
+        Ok(())
+    }
+
+    /// Sends one row so that nothing is lost: after every so many rows it waits until the daemon
+    /// has processed them, and hands the estimates that came to `take`.
+    ///
+    /// # Errors
+    /// As [`Session::send`], or the daemon does not answer, or an estimate was lost.
+    pub fn send_lossless(
+        &mut self,
+        event: &Event,
+        take: &mut impl FnMut(EstimateSe23) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let stamp_ns = event.stamp_ns();
+        let stretch_ns = stamp_ns.saturating_sub(self.settled_ns);
+        if self.in_flight >= IN_FLIGHT || (self.in_flight > 0 && stretch_ns > IN_FLIGHT_NS) {
+            self.settle(take)?;
+        }
+        if self.in_flight == 0 {
+            self.settled_ns = stamp_ns;
+        }
+        self.send(event)?;
+        self.in_flight += 1;
+        Ok(())
+    }
+
+    /// Waits until everything sent has been processed, and hands over the estimates.
+    ///
+    /// # Errors
+    /// As [`Session::send_lossless`].
+    pub fn settle(
+        &mut self,
+        take: &mut impl FnMut(EstimateSe23) -> anyhow::Result<()>,
+    ) -> anyhow::Result<ControlResponse> {
+        let response = self.controller.barrier()?;
+        self.in_flight = 0;
+        self.take_estimates(take)?;
+        Ok(response)
+    }
+
+    /// Hands over the estimates that have come. Never waits.
+    ///
+    /// # Errors
+    /// An estimate was lost, or what `take` returns.
+    pub fn take_estimates(
+        &mut self,
+        take: &mut impl FnMut(EstimateSe23) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        while let Some(estimate) = self.reader.next_estimate()? {
+            take(estimate)?;
+        }
+        if self.reader.missed() > 0 {
+            bail!(
+                "{} estimates were lost: this process was held up for too long",
+                self.reader.missed()
+            );
+        }
+        Ok(())
+    }
+
+    /// The daemon's state and covariance now.
+    ///
+    /// # Errors
+    /// It has none yet, or does not answer.
+    pub fn snapshot(&mut self) -> anyhow::Result<StateVector> {
+        Ok(self.controller.snapshot()?)
+    }
+
+    /// Waits until a daemon's publisher has been found by this session's reader.
+    ///
+    /// # Errors
+    /// None appears within a second.
+    pub fn wait_for_daemon(&mut self) -> anyhow::Result<()> {
+        let started = Instant::now();
+        while self.controller.barrier().is_err() {
+            if started.elapsed() > Duration::from_secs(1) {
+                bail!("the daemon does not answer");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why there is no estimate, in words.
+pub fn why_no_estimate(response: &ControlResponse) -> String {
+    let mut text = format!("the daemon is {}", state_name(response.state_code));
+    if matches!(response.state_code, STATE_WAITING | STATE_ALIGNING) {
+        text += &format!(", waiting for: {}", waiting_for_name(response.waiting_for));
+    }
+    for (code, count) in response.rejected_by_reason.iter().enumerate() {
+        if *count > 0 {
+            let reason = reason_name(u32::try_from(code).unwrap_or(u32::MAX));
+            text += &format!("; rejected {count} ({reason})");
+        }
+    }
+    text
+}
+
+/// The set-state request for a dataset's initial state.
+fn state_vector(initial: &Initial, p0_diag: Option<&[f64]>) -> anyhow::Result<StateVector> {
+    let Initial::Spatial {
+        stamp_ns,
+        q_wb,
+        v_w_mps,
+        p_w_m,
+        gyro_bias_rps,
+        accel_bias_mps2,
+    } = initial
+    else {
+        bail!("meta.json: initial is planar, but this version estimates from an IMU only");
+    };
+    // Without variances the daemon takes those of its configuration.
+    let p0_diag = p0_diag.unwrap_or_default();
+    let mut state = StateVector {
+        model: MODEL_IMU,
+        dimension: u32::try_from(p0_diag.len()).unwrap_or(u32::MAX),
+        stamp_ns: *stamp_ns,
+        q_wb: *q_wb,
+        v_w_mps: *v_w_mps,
+        p_w_m: *p_w_m,
+        gyro_bias_rps: *gyro_bias_rps,
+        accel_bias_mps2: *accel_bias_mps2,
+        ..StateVector::ZERO
+    };
+    for (i, variance) in p0_diag.iter().enumerate() {
+        let slot = triangle_index(i, i, p0_diag.len())
+            .and_then(|index| state.covariance.get_mut(index))
+            .context("meta.json: P0_diag has more than 15 entries")?;
+        *slot = *variance;
+    }
+    Ok(state)
+}

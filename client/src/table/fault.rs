@@ -1,0 +1,118 @@
+//! Faults found in a file: where, what, and how to mend it.
+//!
+//! A reader collects faults instead of stopping at the first, so that one run shows the user
+//! everything that is wrong; after [`MAX_FAULTS_PER_FILE`] it stops reading that file, because a
+//! wrong delimiter makes every line faulty.
+
+use std::fmt;
+
+/// After this many faults in one file the reader gives that file up.
+pub const MAX_FAULTS_PER_FILE: usize = 10;
+
+/// One fault in one file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// The file's name, as the user knows it (`imu.csv`).
+    pub file: String,
+    /// Line in the file, counted from 1; absent when the fault concerns the whole file.
+    pub line: Option<u64>,
+    /// Column name, or the key in `meta.json`.
+    pub column: Option<String>,
+    /// What is wrong, with the offending value.
+    pub problem: String,
+    /// What to do about it.
+    pub remedy: String,
+}
+
+impl Fault {
+    /// A fault that concerns the whole file.
+    pub fn in_file(file: &str, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self {
+            file: file.to_owned(),
+            line: None,
+            column: None,
+            problem: problem.into(),
+            remedy: remedy.into(),
+        }
+    }
+
+    /// The same fault, with a column or key.
+    #[must_use]
+    pub fn at_column(mut self, column: &str) -> Self {
+        self.column = Some(column.to_owned());
+        self
+    }
+
+    /// The same fault, with a line.
+    #[must_use]
+    pub fn at_line(mut self, line: u64) -> Self {
+        self.line = Some(line);
+        self
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.file)?;
+        if let Some(line) = self.line {
+            write!(f, " line {line}")?;
+        }
+        if let Some(column) = &self.column {
+            write!(f, " {column}")?;
+        }
+        write!(f, ": {}; {}", self.problem, self.remedy)
+    }
+}
+
+/// All faults found, in the order in which the files were read.
+///
+/// `Display` is one line (the first fault and how many follow); iterate over [`list`](Self::list)
+/// to show them all.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Faults {
+    list: Vec<Fault>,
+}
+
+impl Faults {
+    /// No faults yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds one.
+    pub fn push(&mut self, fault: Fault) {
+        self.list.push(fault);
+    }
+
+    /// Every fault, in the order found.
+    pub fn list(&self) -> &[Fault] {
+        &self.list
+    }
+
+    /// How many faults there are.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Whether nothing is wrong.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// How many of them concern this file.
+    pub(crate) fn count_in(&self, file: &str) -> usize {
+        self.list.iter().filter(|fault| fault.file == file).count()
+    }
+}
+
+impl fmt::Display for Faults {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.list.as_slice() {
+            [] => f.write_str("no faults"),
+            [only] => write!(f, "{only}"),
+            [first, rest @ ..] => write!(f, "{first} (and {} more)", rest.len()),
+        }
+    }
+}
+
+impl std::error::Error for Faults {}

@@ -1,0 +1,10 @@
+//! Tests of what needs no daemon: datasets, simulation, evaluation, tables and figures.
+
+mod dataset;
+mod evaluate;
+mod meta;
+mod plot;
+mod recordings;
+mod simulate;
+mod simulated_noise;
+mod table;

@@ -1,1 +1,8 @@
-//! inekf-bench
+//! Benchmarks of the estimation service, as distributions and as ratios taken in one run, and the papers' experiments.
+//!
+//! [`latency`] measures the whole path between two processes: a sample sent, its estimate read. [`experiment`] repeats
+//! what \[LC\] and \[PAR\] report, with every filter of the library.
+
+pub mod experiment;
+pub mod latency;
+pub mod pin;

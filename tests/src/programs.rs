@@ -1,0 +1,64 @@
+//! The daemon's and the client's programs, as they are in the working tree.
+//!
+//! Cargo builds the programs of a package for that package's own tests only, so the harness asks for them itself, once
+//! in each test program. Where nothing has changed that costs a fraction of a second.
+
+use std::env;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+/// Files of the programs, which lie side by side.
+#[derive(Clone, Debug)]
+pub struct Programs {
+    /// `inekf-service`.
+    pub service: PathBuf,
+    /// `inekf-client`.
+    pub client: PathBuf,
+}
+
+/// The programs, built in the profile of this test.
+pub fn programs() -> &'static Programs {
+    static PROGRAMS: OnceLock<Programs> = OnceLock::new();
+    PROGRAMS.get_or_init(build)
+}
+
+fn build() -> Programs {
+    let mut command = Command::new(env!("CARGO"));
+    command
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["build", "--quiet", "--bins", "--message-format=json"])
+        .args(["--package=inekf-service", "--package=inekf-client"])
+        .stderr(Stdio::inherit());
+    match profile().as_str() {
+        "debug" => {}
+        profile => drop(command.args(["--profile", profile])),
+    }
+    let output = command.output().expect("cargo cannot be started");
+    assert!(output.status.success(), "the programs cannot be built");
+    let messages = String::from_utf8(output.stdout).expect("cargo's messages are UTF-8");
+    Programs {
+        service: executable(&messages, "inekf-service"),
+        client: executable(&messages, "inekf-client"),
+    }
+}
+
+/// The folder of this program's profile: a test program is `PROFILE/deps/NAME`.
+fn profile() -> String {
+    let own = env::current_exe().expect("the test's own file");
+    let folder = own.ancestors().nth(2).and_then(|folder| folder.file_name());
+    let folder = folder.expect("the folder of a profile");
+    folder.to_string_lossy().into_owned()
+}
+
+/// The file of the program `name`, out of cargo's messages: one JSON object a line.
+fn executable(messages: &str, name: &str) -> PathBuf {
+    messages
+        .lines()
+        .filter_map(|line| serde_json::from_str::<Value>(line).ok())
+        .filter(|message| message["target"]["name"] == name)
+        .find_map(|message| message["executable"].as_str().map(PathBuf::from))
+        .unwrap_or_else(|| panic!("cargo did not say where {name} is"))
+}

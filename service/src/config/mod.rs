@@ -98,7 +98,7 @@ pub struct Config {
 
 impl Config {
     fn read(root: &mut Section<'_, '_>) -> Self {
-        // The placeholder stands only where a fault has been noted: nobody gets to see it.
+        // The fallback is taken only where a fault has been noted: no configuration comes of it.
         let model = root.required_choice("model").unwrap_or(Model::Imu);
         let estimator = root.choice("estimator", Estimator::Inekf);
         let invariance = root.choice("invariance", Invariance::Left);

@@ -11,7 +11,8 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::side::Side;
-use crate::lie::LieGroup;
+use crate::lie::{LieGroup, SE23};
+use crate::model::{ImuIncrement, Transition};
 
 /// `chi = (Exp(phi) R_hat, x_hat + rho)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +70,10 @@ impl Side for Additive {
 
     fn to_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D> {
         uncoupled::<G, D>(chi.inverse().adjoint())
+    }
+
+    fn transition(increment: &ImuIncrement, before: &SE23, _after: &SE23) -> Transition {
+        increment.additive_transition(before)
     }
 
     const IS_LEFT: bool = false;

@@ -57,6 +57,11 @@ impl<const D: usize> Covariance<D> {
         Self(matrix)
     }
 
+    /// A matrix that is exactly symmetric already; a variance that rounding took below zero is put back.
+    pub(super) fn from_symmetric(matrix: SMatrix<f64, D, D>) -> Self {
+        Self(without_negative_variances(matrix))
+    }
+
     /// Independent components with these variances.
     pub fn from_variances(variances: &SVector<f64, D>) -> Self {
         Self(SMatrix::from_diagonal(variances))

@@ -46,6 +46,6 @@ pub use covariance::Covariance;
 pub use gain::{Consider, GainRule, Judgement, Kalman};
 pub use hinf::{HInfinity, HInfinityGain};
 pub use linearised::Linearised;
-pub use propagate::{propagate, propagate_augmented, propagate_odometry};
+pub use propagate::{propagate, propagate_augmented, propagate_dense, propagate_odometry};
 pub use side::{Left, Right, Side};
 pub use update::{Correction, Transport, UpdateError, UpdateOptions, Verdict, update, update_with};

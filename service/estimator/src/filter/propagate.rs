@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, Vector3};
 
 use super::belief::Belief;
+use super::covariance::Covariance;
 use super::side::Side;
 use crate::lie::LieGroup;
 use crate::model::{
@@ -11,9 +12,28 @@ use crate::model::{
 
 /// Moves `belief` over `dt_s` seconds with the raw sample `measured` (its biases are removed here).
 ///
-/// `P+ = F P F^T + Q` in the error of side S: the left-invariant F and Q are carried to the other
-/// side by the adjoints before and after the step (\[PAR\], Proposition 1).
+/// `P+ = F P F^T + Q` in the error of side S, by blocks ([`Transition`](crate::model::Transition)).
 pub fn propagate<G: InertialState<D>, S: Side, const D: usize>(
+    belief: &Belief<G, S, D>,
+    measured: &ImuInput,
+    g_w: &Vector3<f64>,
+    dt_s: f64,
+    discretisation: Discretisation,
+    noise: &ImuNoise,
+) -> Belief<G, S, D> {
+    let before = &belief.mean;
+    let increment = before.increment(measured, g_w, dt_s, discretisation);
+    let mean = before.moved(&increment);
+    let transition = S::transition(&increment, before.pose(), mean.pose());
+    let covariance = G::carry(&transition, belief.covariance.matrix(), noise);
+    Belief::new(mean, Covariance::from_symmetric(covariance))
+}
+
+/// The same as [`propagate`] by general matrix products, which know nothing of the blocks: its reference.
+///
+/// The left-invariant F and Q are carried to the side S by the adjoints before and after the step (\[PAR\],
+/// Proposition 1).
+pub fn propagate_dense<G: InertialState<D>, S: Side, const D: usize>(
     belief: &Belief<G, S, D>,
     measured: &ImuInput,
     g_w: &Vector3<f64>,

@@ -12,7 +12,8 @@ use core::fmt::Debug;
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::lie::LieGroup;
+use crate::lie::{LieGroup, SE23};
+use crate::model::{ImuIncrement, Transition};
 
 /// Which side of the estimate the error sits on.
 pub trait Side: Copy + Clone + Debug + PartialEq {
@@ -31,6 +32,9 @@ pub trait Side: Copy + Clone + Debug + PartialEq {
 
     /// `A^-1`, with `xi_left = A^-1 xi_side` at `chi`.
     fn to_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D>;
+
+    /// How the error of an inertial state moves with `increment`, from the pose `before` to the pose `after`.
+    fn transition(increment: &ImuIncrement, before: &SE23, after: &SE23) -> Transition;
 
     /// Whether the error is the left-invariant one already, so that changes of coordinates can
     /// be left out.
@@ -66,6 +70,10 @@ impl Side for Left {
         SMatrix::identity()
     }
 
+    fn transition(increment: &ImuIncrement, _before: &SE23, _after: &SE23) -> Transition {
+        increment.left_transition()
+    }
+
     const IS_LEFT: bool = true;
 }
 
@@ -88,6 +96,10 @@ impl Side for Right {
 
     fn to_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D> {
         chi.inverse().adjoint()
+    }
+
+    fn transition(increment: &ImuIncrement, before: &SE23, after: &SE23) -> Transition {
+        increment.right_transition(before, after)
     }
 
     const IS_LEFT: bool = false;

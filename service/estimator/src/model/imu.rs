@@ -8,10 +8,10 @@
 //! `euler` is the scheme printed in \[IS\] (17)-(18): `U = (Exp(phi), a dt, 0)`, `W = (I, g dt, 0)`,
 //! which lacks `(R a + g) dt^2 / 2` in the position.
 
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::group_affine::{FreeMotion, GroupAffineStep};
-use crate::lie::series::RotationSeries;
+use super::increment::{ImuIncrement, moved};
 use crate::lie::{LieGroup, SE23, SO3};
 
 /// How an interval with constant rates becomes a step.
@@ -76,69 +76,19 @@ impl ImuStep {
         dt_s: f64,
         discretisation: Discretisation,
     ) -> Self {
-        let phi = input.omega_b * dt_s;
-        let rotation = SO3::exp(&phi);
-        let back = rotation.inverse().matrix();
-        let mut input_jacobian = SMatrix::<f64, 9, 6>::zeros();
-        let rotation_block = SO3::right_jacobian(&phi) * dt_s;
-        input_jacobian
-            .fixed_view_mut::<3, 3>(0, 0)
-            .copy_from(&rotation_block);
+        Self::from(&ImuIncrement::new(input, g_w, dt_s, discretisation))
+    }
 
-        let (world, body) = match discretisation {
-            Discretisation::Euler => {
-                input_jacobian
-                    .fixed_view_mut::<3, 3>(3, 3)
-                    .copy_from(&(back * dt_s));
-                (
-                    (g_w * dt_s, Vector3::zeros()),
-                    (input.force_b * dt_s, Vector3::zeros()),
-                )
-            }
-            Discretisation::ZeroOrderHold => {
-                let (first, second) = (dt_s, dt_s * dt_s);
-                let series = RotationSeries::at(&phi);
-                let gamma_1 = series.gamma::<1>();
-                let gamma_2 = series.gamma::<2>();
-                // Gamma_m(omega dt) a dt^m in its two arguments; one more dt from phi = omega dt.
-                let by_rate_1 = series.gamma_times_derivative::<1>(&input.force_b) * (first * dt_s);
-                let by_rate_2 =
-                    series.gamma_times_derivative::<2>(&input.force_b) * (second * dt_s);
-                let mut place = |row, column, block: nalgebra::Matrix3<f64>| {
-                    input_jacobian
-                        .fixed_view_mut::<3, 3>(row, column)
-                        .copy_from(&(back * block));
-                };
-                place(3, 0, by_rate_1);
-                place(3, 3, gamma_1 * first);
-                place(6, 0, by_rate_2);
-                place(6, 3, gamma_2 * second);
-                (
-                    (g_w * dt_s, g_w * (0.5 * second)),
-                    (
-                        gamma_1 * input.force_b * first,
-                        gamma_2 * input.force_b * second,
-                    ),
-                )
-            }
-        };
-        Self {
-            step: GroupAffineStep::new(
-                SE23 {
-                    rotation: SO3::identity(),
-                    velocity: world.0,
-                    position: world.1,
-                },
-                FreeMotion { dt_s },
-                SE23 {
-                    rotation,
-                    velocity: body.0,
-                    position: body.1,
-                },
-            ),
-            input_jacobian,
-            dt_s,
-        }
+    /// `W phi(pose) U`, without the products by what is known to be neutral.
+    pub fn apply(&self, pose: &SE23) -> SE23 {
+        let GroupAffineStep { world, body, .. } = &self.step;
+        moved(
+            pose,
+            self.dt_s,
+            &body.rotation,
+            &[body.velocity, body.position],
+            &[world.velocity, world.position],
+        )
     }
 
     /// Covariance, 9 x 9, that the white noise of the input adds to the left-invariant error:
@@ -159,5 +109,44 @@ impl ImuStep {
         let mut covariance = scaled * self.input_jacobian.transpose();
         covariance.fill_lower_triangle_with_upper_triangle();
         covariance
+    }
+}
+
+impl From<&ImuIncrement> for ImuStep {
+    fn from(increment: &ImuIncrement) -> Self {
+        let back = increment.turn_matrix.transpose();
+        let mut input_jacobian = SMatrix::<f64, 9, 6>::zeros();
+        let mut place = |row, column, block: &Matrix3<f64>| {
+            input_jacobian
+                .fixed_view_mut::<3, 3>(row, column)
+                .copy_from(&(back * block));
+        };
+        for (row, block) in (0..).step_by(3).zip(&increment.by_rate) {
+            place(row, 0, block);
+        }
+        for (row, block) in (3..).step_by(3).zip(&increment.by_force) {
+            place(row, 3, block);
+        }
+        let [velocity_w, position_w] = increment.world;
+        let [velocity_b, position_b] = increment.body;
+        Self {
+            step: GroupAffineStep::new(
+                SE23 {
+                    rotation: SO3::identity(),
+                    velocity: velocity_w,
+                    position: position_w,
+                },
+                FreeMotion {
+                    dt_s: increment.dt_s,
+                },
+                SE23 {
+                    rotation: increment.turn,
+                    velocity: velocity_b,
+                    position: position_b,
+                },
+            ),
+            input_jacobian,
+            dt_s: increment.dt_s,
+        }
     }
 }

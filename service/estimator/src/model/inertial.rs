@@ -5,6 +5,8 @@
 use nalgebra::{SMatrix, Vector3};
 
 use super::imu::{Discretisation, ImuInput, ImuNoise, ImuStep};
+use super::increment::ImuIncrement;
+use super::transition::Transition;
 use crate::lie::{LieGroup, SE23};
 
 /// A Lie group whose first nine tangent coordinates are those of SE_2(3).
@@ -21,6 +23,23 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
     /// The state with these parts; biases are dropped where the state has none.
     fn from_parts(pose: SE23, gyro_bias: Vector3<f64>, accel_bias: Vector3<f64>) -> Self;
 
+    /// The state after one increment; biases stay.
+    fn moved(&self, increment: &ImuIncrement) -> Self {
+        Self::from_parts(
+            increment.apply(self.pose()),
+            self.gyro_bias(),
+            self.accel_bias(),
+        )
+    }
+
+    /// `F P F^T + Q` for the transition of the error of any side; exactly symmetric, from the upper triangle
+    /// of P.
+    fn carry(
+        transition: &Transition,
+        p: &SMatrix<f64, D, D>,
+        noise: &ImuNoise,
+    ) -> SMatrix<f64, D, D>;
+
     /// The state after one step, the transition matrix F of the left-invariant error and the
     /// covariance Q (symmetric) that the noise of the interval adds.
     fn advance(
@@ -28,6 +47,21 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
         step: &ImuStep,
         noise: &ImuNoise,
     ) -> (Self, SMatrix<f64, D, D>, SMatrix<f64, D, D>);
+
+    /// The motion that the raw sample `measured` says, the biases of this state removed.
+    fn increment(
+        &self,
+        measured: &ImuInput,
+        g_w: &Vector3<f64>,
+        dt_s: f64,
+        discretisation: Discretisation,
+    ) -> ImuIncrement {
+        let input = ImuInput {
+            omega_b: measured.omega_b - self.gyro_bias(),
+            force_b: measured.force_b - self.accel_bias(),
+        };
+        ImuIncrement::new(&input, g_w, dt_s, discretisation)
+    }
 
     /// The step that the raw sample `measured` makes from this state, its biases removed.
     fn imu_step(
@@ -37,11 +71,7 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
         dt_s: f64,
         discretisation: Discretisation,
     ) -> ImuStep {
-        let input = ImuInput {
-            omega_b: measured.omega_b - self.gyro_bias(),
-            force_b: measured.force_b - self.accel_bias(),
-        };
-        ImuStep::new(&input, g_w, dt_s, discretisation)
+        ImuStep::from(&self.increment(measured, g_w, dt_s, discretisation))
     }
 }
 
@@ -62,13 +92,21 @@ impl InertialState<9> for SE23 {
         pose
     }
 
+    fn carry(
+        transition: &Transition,
+        p: &SMatrix<f64, 9, 9>,
+        noise: &ImuNoise,
+    ) -> SMatrix<f64, 9, 9> {
+        transition.carry(p, noise)
+    }
+
     fn advance(
         &self,
         step: &ImuStep,
         noise: &ImuNoise,
     ) -> (Self, SMatrix<f64, 9, 9>, SMatrix<f64, 9, 9>) {
         (
-            step.step.apply(self).normalized(),
+            step.apply(self),
             step.step.left_jacobian(),
             step.noise_covariance(noise),
         )

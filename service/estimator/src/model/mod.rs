@@ -9,17 +9,20 @@
 pub mod augmented;
 pub mod group_affine;
 pub mod imu;
+pub mod increment;
 pub mod inertial;
 pub mod mismatch;
 pub mod nav_state;
 pub mod observation;
 pub mod odometry;
 pub mod pose;
+pub mod transition;
 pub mod unknowns;
 
 pub use augmented::Augmented;
 pub use group_affine::{Automorphism, FreeMotion, GroupAffineStep};
 pub use imu::{Discretisation, ImuInput, ImuNoise, ImuStep};
+pub use increment::ImuIncrement;
 pub use inertial::InertialState;
 pub use mismatch::{Columns, Declared, OutputMismatch, ProcessColumns, ProcessMismatch};
 pub use nav_state::NavState;
@@ -27,4 +30,5 @@ pub use observation::points::{PlanarFix, PlanarPair, PointFix, Points, SpatialFi
 pub use observation::{HeadingObservation, Observation, PositionObservation, VelocityObservation};
 pub use odometry::OdometryStep;
 pub use pose::{Pose, RigidPose};
+pub use transition::Transition;
 pub use unknowns::{AugmentedPoints, AugmentedStep, Unknowns};

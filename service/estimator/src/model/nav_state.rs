@@ -9,6 +9,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::imu::{ImuNoise, ImuStep};
 use super::inertial::InertialState;
+use super::transition::Transition;
 use crate::lie::{LieGroup, SE23};
 
 /// Pose and biases.
@@ -127,6 +128,10 @@ impl InertialState<15> for NavState {
             gyro_bias,
             accel_bias,
         }
+    }
+
+    fn carry(transition: &Transition, p: &Matrix15, noise: &ImuNoise) -> Matrix15 {
+        transition.carry(p, noise)
     }
 
     fn advance(&self, step: &ImuStep, noise: &ImuNoise) -> (Self, Matrix15, Matrix15) {

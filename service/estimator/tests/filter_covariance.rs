@@ -42,23 +42,6 @@ fn a_change_of_coordinates_is_a_p_a_transposed() {
 }
 
 #[test]
-fn a_downdate_is_p_minus_v_v_transposed() {
-    let mut rng = seeded(52);
-    for _ in 0..50 {
-        let p = covariance_of_scale::<15>(&sigmas(1.0), &mut rng);
-        let v: SMatrix<f64, 15, 3> = normal(&mut rng);
-        let reduced = p.downdated(&v);
-        assert_close(
-            "P - V V^T",
-            reduced.matrix(),
-            &(p.matrix() - v * v.transpose()),
-            1e-14,
-        );
-        assert_symmetric(&reduced);
-    }
-}
-
-#[test]
 fn a_correction_is_josephs() {
     let mut rng = seeded(55);
     for _ in 0..50 {

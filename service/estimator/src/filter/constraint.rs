@@ -20,9 +20,10 @@
 //! Like the hard one it forgets: the parameters are drawn anew for each update. A state that remembers them is
 //! an [`Augmented`](crate::model::Augmented) one.
 
-use nalgebra::{Cholesky, Const, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use super::covariance::Covariance;
+use super::factor::Factor;
 use super::gain::Judgement;
 use super::linearised::Linearised;
 use super::update::UpdateError;
@@ -82,7 +83,7 @@ struct Basis<const D: usize, const M: usize> {
 /// `P H^T` and the factor of S with the soft constraints in them.
 struct Softened<const D: usize, const M: usize> {
     p_ht: SMatrix<f64, D, M>,
-    innovation: Cholesky<f64, Const<M>>,
+    innovation: Factor<M>,
 }
 
 impl<const D: usize, const M: usize> Constraints<D, M> {
@@ -140,7 +141,7 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
                 p_ht += column.t * column.delta.transpose() * variance;
                 s += column.delta * column.delta.transpose() * variance;
             }
-            innovation = Cholesky::new(s).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
+            innovation = Factor::new(&s).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
         }
         Ok(Softened { p_ht, innovation })
     }
@@ -286,7 +287,8 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
         linearised: &Linearised<G, D, M>,
         gain: &SMatrix<f64, D, M>,
     ) -> Covariance<D> {
-        let corrected = prior.corrected(gain, &linearised.h, &linearised.noise);
+        let corrected =
+            prior.corrected_with(&linearised.p_ht, gain, &linearised.h, &linearised.noise);
         self.soft().fold(corrected, |covariance, column| {
             let left = (column.t - gain * column.delta) * column.sigma;
             covariance.plus(&(left * left.transpose()))

@@ -4,7 +4,9 @@
 //! matrix drifts from symmetry and goes singular after some hundred updates; this cannot. Where P is
 //! singular by right, a variance can round below zero: it is put back to zero.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{ArrayStorage, SMatrix, SVector};
+
+use super::linearised::sees;
 
 /// A symmetric D x D matrix, meant positive semidefinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,35 +21,55 @@ fn mirror<const D: usize>(matrix: &mut SMatrix<f64, D, D>) {
 }
 
 /// Puts back what rounding took below zero, where no true variance is; NaN stays.
-fn without_negative_variances<const D: usize>(
-    mut matrix: SMatrix<f64, D, D>,
-) -> SMatrix<f64, D, D> {
+fn put_back_negative_variances<const D: usize>(matrix: &mut SMatrix<f64, D, D>) {
     for i in 0..D {
         if matrix[(i, i)] < 0.0 {
             matrix[(i, i)] = 0.0;
         }
     }
-    matrix
 }
 
-/// `A H^T`. A sensor sees few of the states: the zeros of H are passed over.
+/// A column of D rows.
+type Column<const D: usize> = [f64; D];
+
+/// `column + factor * other`, over the first ROWS rows.
+#[inline(always)]
+fn add<const D: usize, const ROWS: usize>(column: &mut Column<D>, factor: f64, other: &Column<D>) {
+    for row in 0..ROWS {
+        column[row] += factor * other[row];
+    }
+}
+
+/// `A H^T`. A sensor sees few of the states: the others are passed over.
 fn times_transposed<const D: usize, const M: usize>(
     a: &SMatrix<f64, D, D>,
     h: &SMatrix<f64, M, D>,
 ) -> SMatrix<f64, D, M> {
-    let mut product = SMatrix::<f64, D, M>::zeros();
-    for k in 0..D {
-        for column in 0..M {
-            let factor = h[(column, k)];
-            if factor == 0.0 {
-                continue;
-            }
-            for row in 0..D {
-                product[(row, column)] += a[(row, k)] * factor;
+    let mut product = [[0.0; D]; M];
+    for k in (0..D).filter(|k| sees(h, *k)) {
+        for (row, column) in product.iter_mut().enumerate() {
+            add::<D, D>(column, h[(row, k)], &a.data.0[k]);
+        }
+    }
+    SMatrix::from_array_storage(ArrayStorage(product))
+}
+
+/// `(B A^T)^T` of a symmetric B, passing over the zeros of A; after a second time with the result it is
+/// `A B A^T`.
+fn half_transformed<const D: usize>(
+    b: &SMatrix<f64, D, D>,
+    a: &SMatrix<f64, D, D>,
+) -> SMatrix<f64, D, D> {
+    let mut product = [[0.0; D]; D];
+    for (row, column) in product.iter_mut().enumerate() {
+        for k in 0..D {
+            let factor = a[(row, k)];
+            if factor != 0.0 {
+                add::<D, D>(column, factor, &b.data.0[k]);
             }
         }
     }
-    product
+    SMatrix::from_array_storage(ArrayStorage(product)).transpose()
 }
 
 impl<const D: usize> Covariance<D> {
@@ -57,9 +79,12 @@ impl<const D: usize> Covariance<D> {
         Self(matrix)
     }
 
-    /// A matrix that is exactly symmetric already; a variance that rounding took below zero is put back.
-    pub(super) fn from_symmetric(matrix: SMatrix<f64, D, D>) -> Self {
-        Self(without_negative_variances(matrix))
+    /// Lets `change` work on the matrix, which it leaves exactly symmetric; a variance that rounding took below
+    /// zero is put back.
+    #[inline]
+    pub(super) fn change_symmetrically(&mut self, change: impl FnOnce(&mut SMatrix<f64, D, D>)) {
+        change(&mut self.0);
+        put_back_negative_variances(&mut self.0);
     }
 
     /// Independent components with these variances.
@@ -74,23 +99,10 @@ impl<const D: usize> Covariance<D> {
 
     /// `A P A^T`.
     pub fn transformed(&self, a: &SMatrix<f64, D, D>) -> Self {
-        let half = a * self.0;
-        let mut result = SMatrix::<f64, D, D>::zeros();
-        let at = a.transpose();
-        // Column by column: entry (row, column) for row <= column is half.row(row) . a.row(column).
-        for column in 0..D {
-            for k in 0..D {
-                let factor = at[(k, column)];
-                if factor == 0.0 {
-                    continue;
-                }
-                for row in 0..=column {
-                    result[(row, column)] += half[(row, k)] * factor;
-                }
-            }
-        }
+        let mut result = half_transformed(&half_transformed(&self.0, a), a);
         mirror(&mut result);
-        Self(without_negative_variances(result))
+        put_back_negative_variances(&mut result);
+        Self(result)
     }
 
     /// `P + Q` for a symmetric Q.
@@ -114,43 +126,39 @@ impl<const D: usize> Covariance<D> {
         h: &SMatrix<f64, M, D>,
         noise: &SMatrix<f64, M, M>,
     ) -> Self {
-        let p_ht = self.times_transposed(h);
+        self.corrected_with(&self.times_transposed(h), gain, h, noise)
+    }
+
+    /// [`corrected`](Self::corrected) where `P H^T` is known.
+    pub(super) fn corrected_with<const M: usize>(
+        &self,
+        p_ht: &SMatrix<f64, D, M>,
+        gain: &SMatrix<f64, D, M>,
+        h: &SMatrix<f64, M, D>,
+        noise: &SMatrix<f64, M, M>,
+    ) -> Self {
+        let gains = &gain.data.0;
         let mut a = self.0;
         for column in 0..D {
             for k in 0..M {
-                let factor = p_ht[(column, k)];
-                for row in 0..D {
-                    a[(row, column)] -= gain[(row, k)] * factor;
-                }
+                add::<D, D>(&mut a.data.0[column], -p_ht[(column, k)], &gains[k]);
             }
         }
-        let excess = times_transposed(&a, h) - gain * noise;
-        let corrected = Self(a).minus_product(&excess, gain);
-        Self(without_negative_variances(corrected.0))
-    }
-
-    /// `P - V V^T`, V of shape D x M, for a V that is known to be far from P.
-    pub fn downdated<const M: usize>(&self, v: &SMatrix<f64, D, M>) -> Self {
-        self.minus_product(v, v)
-    }
-
-    /// `P - X Y^T`, of which the upper triangle is computed.
-    fn minus_product<const M: usize>(
-        &self,
-        x: &SMatrix<f64, D, M>,
-        y: &SMatrix<f64, D, M>,
-    ) -> Self {
-        let mut result = self.0;
+        // A H^T - K N
+        let mut excess = times_transposed(&a, h);
+        for column in 0..M {
+            for k in 0..M {
+                add::<D, D>(&mut excess.data.0[column], -noise[(k, column)], &gains[k]);
+            }
+        }
         for column in 0..D {
             for k in 0..M {
-                let factor = y[(column, k)];
-                for row in 0..=column {
-                    result[(row, column)] -= x[(row, k)] * factor;
-                }
+                add::<D, D>(&mut a.data.0[column], -gain[(column, k)], &excess.data.0[k]);
             }
         }
-        mirror(&mut result);
-        Self(result)
+        mirror(&mut a);
+        put_back_negative_variances(&mut a);
+        Self(a)
     }
 
     /// `factor * P`.
@@ -160,7 +168,12 @@ impl<const D: usize> Covariance<D> {
 
     /// Whether every entry is finite and no variance negative.
     pub fn is_plausible(&self) -> bool {
-        self.0.iter().all(|entry| entry.is_finite()) && (0..D).all(|i| self.0[(i, i)] >= 0.0)
+        // 0 times what is not finite is NaN, and stays NaN in a sum: no branch for each entry.
+        let mut sums = [0.0; D];
+        for column in &self.0.data.0 {
+            add::<D, D>(&mut sums, 0.0, column);
+        }
+        sums.iter().all(|sum| *sum == 0.0) && (0..D).all(|i| self.0[(i, i)] >= 0.0)
     }
 
     /// The upper triangle, row by row.

@@ -86,7 +86,7 @@ pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
         linearised: &Linearised<G, D, M>,
         gain: &SMatrix<f64, D, M>,
     ) -> Result<Covariance<D>, UpdateError> {
-        Ok(prior.corrected(gain, &linearised.h, &linearised.noise))
+        Ok(prior.corrected_with(&linearised.p_ht, gain, &linearised.h, &linearised.noise))
     }
 }
 
@@ -95,7 +95,16 @@ pub(super) fn kalman_gain<G: LieGroup<D>, const D: usize, const M: usize>(
     linearised: &Linearised<G, D, M>,
 ) -> SMatrix<f64, D, M> {
     // An M x M inverse is cheap, and the corrected covariance forgives a rounded gain.
-    linearised.p_ht * linearised.innovation.inverse()
+    let inverse = linearised.innovation.inverse();
+    let mut gain = SMatrix::<f64, D, M>::zeros();
+    for column in 0..M {
+        for k in 0..M {
+            for row in 0..D {
+                gain[(row, column)] += linearised.p_ht[(row, k)] * inverse[(k, column)];
+            }
+        }
+    }
+    gain
 }
 
 /// The minimum of `xi^T P^-1 xi + z^T N^-1 z`.

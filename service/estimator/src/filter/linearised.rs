@@ -1,8 +1,9 @@
 //! An observation linearised around one iterate, with the factors that every gain needs.
 
-use nalgebra::{Cholesky, Const, SMatrix, SVector};
+use nalgebra::{SMatrix, SVector};
 
 use super::belief::Belief;
+use super::factor::Factor;
 use super::side::Side;
 use crate::lie::LieGroup;
 use crate::model::Observation;
@@ -21,7 +22,48 @@ pub struct Linearised<G, const D: usize, const M: usize> {
     /// `P H_i^T`.
     pub p_ht: SMatrix<f64, D, M>,
     /// Cholesky factor of `S_i = H_i P H_i^T + N`.
-    pub innovation: Cholesky<f64, Const<M>>,
+    pub innovation: Factor<M>,
+}
+
+/// Whether a column of H has an entry that is not zero: whether the sensor sees this state.
+#[inline(always)]
+pub(super) fn sees<const D: usize, const M: usize>(h: &SMatrix<f64, M, D>, state: usize) -> bool {
+    (0..M).any(|row| h[(row, state)] != 0.0)
+}
+
+/// `H J`, passing over the states that the sensor does not see.
+#[inline]
+fn times<const D: usize, const M: usize>(
+    h: &SMatrix<f64, M, D>,
+    j: &SMatrix<f64, D, D>,
+) -> SMatrix<f64, M, D> {
+    let mut product = SMatrix::<f64, M, D>::zeros();
+    for k in (0..D).filter(|k| sees(h, *k)) {
+        for column in 0..D {
+            for row in 0..M {
+                product[(row, column)] += h[(row, k)] * j[(k, column)];
+            }
+        }
+    }
+    product
+}
+
+/// `N + H B`, passing over the states that the sensor does not see.
+#[inline]
+fn sum_of_product<const D: usize, const M: usize>(
+    noise: &SMatrix<f64, M, M>,
+    h: &SMatrix<f64, M, D>,
+    b: &SMatrix<f64, D, M>,
+) -> SMatrix<f64, M, M> {
+    let mut sum = *noise;
+    for k in (0..D).filter(|k| sees(h, *k)) {
+        for column in 0..M {
+            for row in 0..M {
+                sum[(row, column)] += h[(row, k)] * b[(k, column)];
+            }
+        }
+    }
+    sum
 }
 
 impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
@@ -40,13 +82,13 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     {
         let mut h = observation.left_jacobian(chi);
         if !S::IS_LEFT {
-            h *= S::to_left(chi);
+            h = times(&h, &S::to_left(chi));
         }
         if xi.iter().any(|component| *component != 0.0) {
-            h *= S::jacobian::<G, D>(xi);
+            h = times(&h, &S::jacobian::<G, D>(xi));
         }
         let p_ht = belief.covariance.times_transposed(&h);
-        let innovation = Cholesky::new(h * p_ht + noise)?;
+        let innovation = Factor::new(&sum_of_product(noise, &h, &p_ht))?;
         Some(Self {
             chi: *chi,
             residual: observation.residual(chi),
@@ -59,17 +101,16 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
 
     /// S, M x M.
     pub fn innovation_covariance(&self) -> SMatrix<f64, M, M> {
-        self.h * self.p_ht + self.noise
+        sum_of_product(&self.noise, &self.h, &self.p_ht)
     }
 
     /// `z^T S^-1 z`.
     pub fn normalised_square(&self) -> f64 {
-        self.residual.dot(&self.innovation.solve(&self.residual))
+        self.innovation.normalised_square(&self.residual)
     }
 
     /// `ln det S`.
     pub fn log_determinant(&self) -> f64 {
-        let root = self.innovation.l_dirty();
-        (0..M).map(|m| 2.0 * root[(m, m)].ln()).sum()
+        self.innovation.log_determinant()
     }
 }

@@ -28,6 +28,7 @@ pub mod belief;
 pub mod constrained;
 pub mod constraint;
 pub mod covariance;
+pub mod factor;
 pub mod gain;
 pub mod gate;
 pub mod hinf;
@@ -43,9 +44,12 @@ pub use belief::Belief;
 pub use constrained::Constrained;
 pub use constraint::Constraints;
 pub use covariance::Covariance;
+pub use factor::Factor;
 pub use gain::{Consider, GainRule, Judgement, Kalman};
 pub use hinf::{HInfinity, HInfinityGain};
 pub use linearised::Linearised;
-pub use propagate::{propagate, propagate_augmented, propagate_dense, propagate_odometry};
+pub use propagate::{
+    propagate, propagate_augmented, propagate_dense, propagate_in_place, propagate_odometry,
+};
 pub use side::{Left, Right, Side};
 pub use update::{Correction, Transport, UpdateError, UpdateOptions, Verdict, update, update_with};

@@ -3,7 +3,6 @@
 use nalgebra::{SMatrix, Vector3};
 
 use super::belief::Belief;
-use super::covariance::Covariance;
 use super::side::Side;
 use crate::lie::LieGroup;
 use crate::model::{
@@ -21,12 +20,29 @@ pub fn propagate<G: InertialState<D>, S: Side, const D: usize>(
     discretisation: Discretisation,
     noise: &ImuNoise,
 ) -> Belief<G, S, D> {
+    let mut moved = *belief;
+    propagate_in_place(&mut moved, measured, g_w, dt_s, discretisation, noise);
+    moved
+}
+
+/// [`propagate`] without a second belief.
+#[inline]
+pub fn propagate_in_place<G: InertialState<D>, S: Side, const D: usize>(
+    belief: &mut Belief<G, S, D>,
+    measured: &ImuInput,
+    g_w: &Vector3<f64>,
+    dt_s: f64,
+    discretisation: Discretisation,
+    noise: &ImuNoise,
+) {
     let before = &belief.mean;
     let increment = before.increment(measured, g_w, dt_s, discretisation);
     let mean = before.moved(&increment);
     let transition = S::transition(&increment, before.pose(), mean.pose());
-    let covariance = G::carry(&transition, belief.covariance.matrix(), noise);
-    Belief::new(mean, Covariance::from_symmetric(covariance))
+    belief.mean = mean;
+    belief
+        .covariance
+        .change_symmetrically(|p| G::carry(&transition, p, noise));
 }
 
 /// The same as [`propagate`] by general matrix products, which know nothing of the blocks: its reference.

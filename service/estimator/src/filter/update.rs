@@ -17,9 +17,10 @@
 
 use core::fmt;
 
-use nalgebra::{Cholesky, SVector};
+use nalgebra::SVector;
 
 use super::belief::Belief;
+use super::factor::Factor;
 use super::gain::{GainRule, Iterate, Judgement, Kalman};
 use super::linearised::Linearised;
 use super::side::Side;
@@ -204,10 +205,9 @@ where
     L: GainRule<G, D, M>,
 {
     let noise = observation.noise();
-    let noise_factor = Cholesky::new(noise).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
+    let noise_factor = Factor::new(&noise).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
     let cost = |iterate: &Iterate<D>, chi: &G| {
-        let z = observation.residual(chi);
-        iterate.xi.dot(&iterate.eta) + z.dot(&noise_factor.solve(&z))
+        iterate.xi.dot(&iterate.eta) + noise_factor.normalised_square(&observation.residual(chi))
     };
 
     let mut current = Iterate {

@@ -32,13 +32,8 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
         )
     }
 
-    /// `F P F^T + Q` for the transition of the error of any side; exactly symmetric, from the upper triangle
-    /// of P.
-    fn carry(
-        transition: &Transition,
-        p: &SMatrix<f64, D, D>,
-        noise: &ImuNoise,
-    ) -> SMatrix<f64, D, D>;
+    /// Makes the symmetric P `F P F^T + Q`, for the transition of the error of any side; exactly symmetric.
+    fn carry(transition: &Transition, p: &mut SMatrix<f64, D, D>, noise: &ImuNoise);
 
     /// The state after one step, the transition matrix F of the left-invariant error and the
     /// covariance Q (symmetric) that the noise of the interval adds.
@@ -92,12 +87,8 @@ impl InertialState<9> for SE23 {
         pose
     }
 
-    fn carry(
-        transition: &Transition,
-        p: &SMatrix<f64, 9, 9>,
-        noise: &ImuNoise,
-    ) -> SMatrix<f64, 9, 9> {
-        transition.carry(p, noise)
+    fn carry(transition: &Transition, p: &mut SMatrix<f64, 9, 9>, noise: &ImuNoise) {
+        transition.carry::<9, 16>(p, noise);
     }
 
     fn advance(

@@ -35,24 +35,24 @@ pub struct Transition {
     pub by_force: [Matrix3<f64>; 2],
 }
 
-/// How many of the coordinates are the pose.
+/// How many of the coordinates are the pose; the biases begin after them.
 const POSE: usize = 9;
-/// Where the biases begin.
-const BIAS: usize = POSE;
+/// How many inputs are noisy, and how many biases there are: three rates and three forces.
+const INPUTS: usize = 6;
 
-/// A column of the covariance, or of its product with `F^T`.
+/// A column of a matrix.
 type Column<const R: usize> = [f64; R];
 
-/// `base + sum_n factors_n columns_n`.
+/// `base + sum_n factors_n columns_n`, over as many rows as `base` has.
 #[inline(always)]
-fn combined<const R: usize, const N: usize>(
-    base: &Column<R>,
+fn combined<const D: usize, const R: usize, const N: usize>(
+    base: &Column<D>,
     factors: [f64; N],
-    columns: [&Column<R>; N],
+    columns: [&Column<D>; N],
 ) -> Column<R> {
-    let mut sum = *base;
-    for row in 0..R {
-        let mut entry = sum[row];
+    let mut sum = [0.0; R];
+    for row in 0..D {
+        let mut entry = base[row];
         for n in 0..N {
             entry += factors[n] * columns[n][row];
         }
@@ -61,194 +61,183 @@ fn combined<const R: usize, const N: usize>(
     sum
 }
 
-/// `matrix` times the three entries of `column` from `start` on.
-#[inline(always)]
-fn times<const R: usize>(matrix: &Matrix3<f64>, column: &Column<R>, start: usize) -> Vector3<f64> {
-    let part = Vector3::new(column[start], column[start + 1], column[start + 2]);
-    product(matrix, &part)
-}
-
-/// `matrix vector`, written out: nalgebra's general product of this size is a call.
-#[inline(always)]
-fn product(matrix: &Matrix3<f64>, vector: &Vector3<f64>) -> Vector3<f64> {
-    let row = |i| matrix[(i, 0)] * vector.x + matrix[(i, 1)] * vector.y + matrix[(i, 2)] * vector.z;
-    Vector3::new(row(0), row(1), row(2))
-}
-
-#[inline(always)]
-fn part<const R: usize>(column: &Column<R>, start: usize) -> Vector3<f64> {
-    Vector3::new(column[start], column[start + 1], column[start + 2])
-}
-
 impl Transition {
-    /// `F P F^T + Q`, D = 9 without biases and 15 with them; of P the upper triangle counts, the result is
-    /// exactly symmetric.
+    /// Makes P `F P F^T + Q`, exactly symmetric; D = 9 without biases and 15 with them, and R is at least `D + 6`.
     #[inline(always)]
-    pub(super) fn carry<const D: usize>(
+    pub(super) fn carry<const D: usize, const R: usize>(
         &self,
-        p: &SMatrix<f64, D, D>,
+        p: &mut SMatrix<f64, D, D>,
         noise: &ImuNoise,
-    ) -> SMatrix<f64, D, D> {
-        const { assert!(D == POSE || D == POSE + 6) };
-        let t = self.times_transposed(&p.data.0);
-        let white = self.white(&t, noise);
-        let mut carried = [[0.0; D]; D];
-        for column in 0..POSE {
-            let on_pose = self.row_block(&t[column], &white[column], column / 3);
-            for row in 0..=column {
-                carried[column][row] = on_pose[row];
-                carried[row][column] = on_pose[row];
-            }
+    ) {
+        const { assert!(D == POSE || D == POSE + INPUTS) };
+        const { assert!(R >= D + INPUTS) };
+        let p = &mut p.data.0;
+        let inputs = self.input_columns();
+        let mut t: [Column<R>; POSE] = self.times_transposed(p, &inputs);
+        self.append_noise::<D, R>(&mut t, &inputs, noise);
+        self.turn_columns(&mut t);
+        for i in 0..3 {
+            self.finish::<D, R, 3>(p, &t[i], &inputs, i);
+            self.finish::<D, R, 6>(p, &t[3 + i], &inputs, 3 + i);
+            self.finish::<D, R, 9>(p, &t[6 + i], &inputs, 6 + i);
         }
         for column in 0..POSE {
-            for row in BIAS..D {
-                carried[column][row] = t[column][row];
-                carried[row][column] = t[column][row];
+            for row in POSE..D {
+                p[column][row] = t[column][row];
+                p[row][column] = t[column][row];
             }
         }
-        for column in BIAS..D {
-            for row in BIAS..D {
-                carried[column][row] = p[(row, column)];
-            }
-        }
-        if D > BIAS {
+        if D > POSE {
             for axis in 0..3 {
-                carried[BIAS + axis][BIAS + axis] += noise.gyro_bias_psd * self.dt_s;
-                carried[BIAS + 3 + axis][BIAS + 3 + axis] += noise.accel_bias_psd * self.dt_s;
+                p[POSE + axis][POSE + axis] += noise.gyro_bias_psd * self.dt_s;
+                p[POSE + 3 + axis][POSE + 3 + axis] += noise.accel_bias_psd * self.dt_s;
             }
         }
-        SMatrix::from_array_storage(nalgebra::ArrayStorage(carried))
     }
 
-    /// `P F^T`, the columns of the pose.
+    /// What each input adds to the pose, before the turn: the columns of `[N_0 0; N_1 A_1; N_2 A_2]`.
     #[inline(always)]
-    fn times_transposed<const D: usize>(&self, p: &[Column<D>; D]) -> [Column<D>; POSE] {
+    fn input_columns(&self) -> [Column<POSE>; INPUTS] {
+        let mut columns = [[0.0; POSE]; INPUTS];
+        for n in 0..3 {
+            for i in 0..3 {
+                columns[n][i] = self.by_rate[0][(i, n)];
+                columns[n][3 + i] = self.by_rate[1][(i, n)];
+                columns[n][6 + i] = self.by_rate[2][(i, n)];
+                columns[3 + n][3 + i] = self.by_force[0][(i, n)];
+                columns[3 + n][6 + i] = self.by_force[1][(i, n)];
+            }
+        }
+        columns
+    }
+
+    /// The columns of the pose in `P F^T`, before the turn; the rows from D on are zero.
+    #[inline(always)]
+    fn times_transposed<const D: usize, const R: usize>(
+        &self,
+        p: &[Column<D>; D],
+        inputs: &[Column<POSE>; INPUTS],
+    ) -> [Column<R>; POSE] {
         let [c_1, c_2] = &self.couplings;
-        let mut t = [[0.0; D]; POSE];
+        let mut t = [[0.0; R]; POSE];
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
             // (c x phi)_i = c_j phi_k - c_k phi_j
+            let (phi_j, phi_k, nu) = (&p[j], &p[k], &p[3 + i]);
             if D == POSE {
-                t[i] = p[i];
-                t[3 + i] = combined(&p[3 + i], [c_1[j], -c_1[k]], [&p[k], &p[j]]);
-                t[6 + i] = combined(
-                    &p[6 + i],
-                    [self.dt_s, c_2[j], -c_2[k]],
-                    [&p[3 + i], &p[k], &p[j]],
-                );
+                t[i] = combined(&p[i], [], []);
+                t[3 + i] = combined(nu, [c_1[j], -c_1[k]], [phi_k, phi_j]);
+                let factors = [self.dt_s, c_2[j], -c_2[k]];
+                t[6 + i] = combined(&p[6 + i], factors, [nu, phi_k, phi_j]);
             } else {
-                let row = |block: &Matrix3<f64>| [-block[(i, 0)], -block[(i, 1)], -block[(i, 2)]];
-                let [n_0, n_1, n_2] = self.by_rate.each_ref().map(row);
-                let [a_1, a_2] = self.by_force.each_ref().map(row);
-                let b: [&Column<D>; 6] = core::array::from_fn(|n| &p[BIAS + n]);
-                t[i] = combined(&p[i], n_0, [b[0], b[1], b[2]]);
+                let bias: [&Column<D>; INPUTS] = core::array::from_fn(|n| &p[POSE + n]);
+                let [rate_x, rate_y, rate_z, force_x, force_y, force_z] = bias;
+                let [x, y, z, u, v, w] = inputs.each_ref().map(|column| -column[i]);
+                let _ = (u, v, w);
+                t[i] = combined(&p[i], [x, y, z], [rate_x, rate_y, rate_z]);
+                let [x, y, z, u, v, w] = inputs.each_ref().map(|column| -column[3 + i]);
                 t[3 + i] = combined(
-                    &p[3 + i],
+                    nu,
+                    [c_1[j], -c_1[k], x, y, z, u, v, w],
                     [
-                        c_1[j], -c_1[k], n_1[0], n_1[1], n_1[2], a_1[0], a_1[1], a_1[2],
+                        phi_k, phi_j, rate_x, rate_y, rate_z, force_x, force_y, force_z,
                     ],
-                    [&p[k], &p[j], b[0], b[1], b[2], b[3], b[4], b[5]],
                 );
+                let [x, y, z, u, v, w] = inputs.each_ref().map(|column| -column[6 + i]);
                 t[6 + i] = combined(
                     &p[6 + i],
+                    [self.dt_s, c_2[j], -c_2[k], x, y, z, u, v, w],
                     [
-                        self.dt_s, c_2[j], -c_2[k], n_2[0], n_2[1], n_2[2], a_2[0], a_2[1], a_2[2],
+                        nu, phi_k, phi_j, rate_x, rate_y, rate_z, force_x, force_y, force_z,
                     ],
-                    [&p[3 + i], &p[k], &p[j], b[0], b[1], b[2], b[3], b[4], b[5]],
                 );
-            }
-        }
-        if let Some(e) = &self.turn {
-            for block in 0..3 {
-                let start = 3 * block;
-                let old = [t[start], t[start + 1], t[start + 2]];
-                for i in 0..3 {
-                    let mut sum = [0.0; D];
-                    for row in 0..D {
-                        sum[row] = e[(i, 0)] * old[0][row]
-                            + e[(i, 1)] * old[1][row]
-                            + e[(i, 2)] * old[2][row];
-                    }
-                    t[start + i] = sum;
-                }
             }
         }
         t
     }
 
-    /// The rows of the biases in T, less what white noise of the input adds to them: `psd / dt` times B^T.
+    /// The rows of the biases in T again, from row D on, less what the white noise of the input adds there:
+    /// `psd / dt` times the transpose of `inputs`.
     #[inline(always)]
-    fn white<const D: usize>(&self, t: &[Column<D>; POSE], noise: &ImuNoise) -> [Column<6>; POSE] {
-        let mut white = [[0.0; 6]; POSE];
-        if D > BIAS {
-            for column in 0..POSE {
-                for row in 0..6 {
-                    white[column][row] = t[column][BIAS + row];
-                }
-            }
-        }
+    fn append_noise<const D: usize, const R: usize>(
+        &self,
+        t: &mut [Column<R>; POSE],
+        inputs: &[Column<POSE>; INPUTS],
+        noise: &ImuNoise,
+    ) {
         // Over no time there is no noise, and no quotient.
-        if self.dt_s > 0.0 {
-            let (gyro, accel) = (noise.gyro_psd / self.dt_s, noise.accel_psd / self.dt_s);
-            let mut less = |block: usize, start: usize, factor: f64, matrix: &Matrix3<f64>| {
-                let turned = match &self.turn {
-                    Some(e) => e * matrix,
-                    None => *matrix,
-                };
-                for i in 0..3 {
-                    for n in 0..3 {
-                        white[3 * block + i][start + n] -= factor * turned[(i, n)];
-                    }
-                }
-            };
-            for block in 0..3 {
-                less(block, 0, gyro, &self.by_rate[block]);
-            }
-            for block in 0..2 {
-                less(block + 1, 3, accel, &self.by_force[block]);
+        let rate = if self.dt_s > 0.0 {
+            1.0 / self.dt_s
+        } else {
+            0.0
+        };
+        let (gyro, accel) = (noise.gyro_psd * rate, noise.accel_psd * rate);
+        for column in 0..POSE {
+            for n in 0..INPUTS {
+                let known = if D > POSE { t[column][POSE + n] } else { 0.0 };
+                let psd = if n < 3 { gyro } else { accel };
+                t[column][D + n] = known - psd * inputs[n][column];
             }
         }
-        white
     }
 
-    /// The first `3 (last + 1)` rows of `F T` in one column.
+    /// Each block of three columns times `E^T`.
     #[inline(always)]
-    fn row_block<const D: usize>(
-        &self,
-        t: &Column<D>,
-        white: &Column<6>,
-        last: usize,
-    ) -> Column<POSE> {
-        let turned = |a: Vector3<f64>| match &self.turn {
-            Some(e) => product(e, &a),
-            None => a,
-        };
-        let phi = part(t, 0);
-        let mut rows = [0.0; POSE];
-        let mut put = |start: usize, a: Vector3<f64>| {
-            let a = turned(a);
-            rows[start] = a.x;
-            rows[start + 1] = a.y;
-            rows[start + 2] = a.z;
-        };
-        put(0, phi - times(&self.by_rate[0], white, 0));
-        if last >= 1 {
-            let nu = part(t, 3);
-            put(
-                3,
-                nu + self.couplings[0].cross(&phi)
-                    - times(&self.by_rate[1], white, 0)
-                    - times(&self.by_force[0], white, 3),
-            );
-            if last >= 2 {
-                put(
-                    6,
-                    part(t, 6) + self.couplings[1].cross(&phi) + nu * self.dt_s
-                        - times(&self.by_rate[2], white, 0)
-                        - times(&self.by_force[1], white, 3),
-                );
+    fn turn_columns<const R: usize>(&self, t: &mut [Column<R>; POSE]) {
+        let Some(e) = &self.turn else { return };
+        for block in t.chunks_exact_mut(3) {
+            let [x, y, z] = block else { continue };
+            for row in 0..R {
+                let (a, b, c) = (x[row], y[row], z[row]);
+                x[row] = e[(0, 0)] * a + e[(0, 1)] * b + e[(0, 2)] * c;
+                y[row] = e[(1, 0)] * a + e[(1, 1)] * b + e[(1, 2)] * c;
+                z[row] = e[(2, 0)] * a + e[(2, 1)] * b + e[(2, 2)] * c;
             }
         }
-        rows
+    }
+
+    /// Puts the first rows of `F T` into one column of P, and into its row: ROWS of them are computed, which
+    /// reach the diagonal.
+    #[inline(always)]
+    fn finish<const D: usize, const R: usize, const ROWS: usize>(
+        &self,
+        p: &mut [Column<D>; D],
+        t: &Column<R>,
+        inputs: &[Column<POSE>; INPUTS],
+        column: usize,
+    ) {
+        let mut rows = [0.0; ROWS];
+        rows.copy_from_slice(&t[..ROWS]);
+        for i in 0..3 {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            let [c_1, c_2] = &self.couplings;
+            if ROWS > 3 {
+                rows[3 + i] += c_1[j] * t[k] - c_1[k] * t[j];
+            }
+            if ROWS > 6 {
+                rows[6 + i] += c_2[j] * t[k] - c_2[k] * t[j] + self.dt_s * t[3 + i];
+            }
+        }
+        // The forces do not act on the rotation.
+        let acting = if ROWS > 3 { INPUTS } else { 3 };
+        for n in 0..acting {
+            let bias = t[D + n];
+            for row in 0..ROWS {
+                rows[row] -= inputs[n][row] * bias;
+            }
+        }
+        if let Some(e) = &self.turn {
+            for block in rows.chunks_exact_mut(3) {
+                let [x, y, z] = block else { continue };
+                let (a, b, c) = (*x, *y, *z);
+                *x = e[(0, 0)] * a + e[(0, 1)] * b + e[(0, 2)] * c;
+                *y = e[(1, 0)] * a + e[(1, 1)] * b + e[(1, 2)] * c;
+                *z = e[(2, 0)] * a + e[(2, 1)] * b + e[(2, 2)] * c;
+            }
+        }
+        for row in 0..=column {
+            p[column][row] = rows[row];
+            p[row][column] = rows[row];
+        }
     }
 }

@@ -27,22 +27,20 @@ impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
     }
 
     /// The belief whose left-invariant error has this covariance.
-    pub fn from_left_covariance(mean: G, covariance: Covariance<D>) -> Self {
-        let covariance = if S::IS_LEFT {
-            covariance
-        } else {
-            covariance.transformed(&S::from_left(&mean))
-        };
+    pub fn from_left_covariance(mean: G, mut covariance: Covariance<D>) -> Self {
+        if !S::IS_LEFT {
+            covariance.transform_by::<G>(&S::from_left(&mean));
+        }
         Self::new(mean, covariance)
     }
 
     /// Covariance of the left-invariant error, which is what is published.
     pub fn left_covariance(&self) -> Covariance<D> {
-        if S::IS_LEFT {
-            self.covariance
-        } else {
-            self.covariance.transformed(&S::to_left(&self.mean))
+        let mut covariance = self.covariance;
+        if !S::IS_LEFT {
+            covariance.transform_by::<G>(&S::to_left(&self.mean));
         }
+        covariance
     }
 
     /// Whether mean and covariance are finite and no variance is negative.

@@ -7,6 +7,7 @@
 use nalgebra::{ArrayStorage, SMatrix, SVector};
 
 use super::linearised::sees;
+use crate::lie::LieGroup;
 
 /// A symmetric D x D matrix, meant positive semidefinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +38,24 @@ type Column<const D: usize> = [f64; D];
 fn add<const D: usize, const ROWS: usize>(column: &mut Column<D>, factor: f64, other: &Column<D>) {
     for row in 0..ROWS {
         column[row] += factor * other[row];
+    }
+}
+
+/// `column - sum_k factor(k) others_k`, over the first ROWS rows.
+#[inline(always)]
+fn subtract<const D: usize, const ROWS: usize, const M: usize>(
+    column: &mut Column<D>,
+    others: &[Column<D>; M],
+    factor: impl Fn(usize) -> f64,
+) {
+    let mut factors = [0.0; M];
+    for k in 0..M {
+        factors[k] = factor(k);
+    }
+    for row in 0..ROWS {
+        for k in 0..M {
+            column[row] -= factors[k] * others[k][row];
+        }
     }
 }
 
@@ -105,6 +124,12 @@ impl<const D: usize> Covariance<D> {
         Self(result)
     }
 
+    /// [`transformed`](Self::transformed) by a matrix with the zeros of the adjoint of G, in place.
+    #[inline]
+    pub(super) fn transform_by<G: LieGroup<D>>(&mut self, a: &SMatrix<f64, D, D>) {
+        self.change_symmetrically(|p| G::congruence(p, a));
+    }
+
     /// `P + Q` for a symmetric Q.
     pub fn plus(&self, q: &SMatrix<f64, D, D>) -> Self {
         Self::from_upper(self.0 + q)
@@ -138,27 +163,37 @@ impl<const D: usize> Covariance<D> {
         noise: &SMatrix<f64, M, M>,
     ) -> Self {
         let gains = &gain.data.0;
-        let mut a = self.0;
-        for column in 0..D {
-            for k in 0..M {
-                add::<D, D>(&mut a.data.0[column], -p_ht[(column, k)], &gains[k]);
+        let mut corrected = *self;
+        // A H^T - K N, of which A is needed in the columns of the states that are seen.
+        let mut excess = [[0.0; D]; M];
+        for state in (0..D).filter(|state| sees(h, *state)) {
+            let mut a = corrected.0.data.0[state];
+            subtract::<D, D, M>(&mut a, gains, |k| p_ht[(state, k)]);
+            for (row, column) in excess.iter_mut().enumerate() {
+                add::<D, D>(column, h[(row, state)], &a);
             }
         }
-        // A H^T - K N
-        let mut excess = times_transposed(&a, h);
-        for column in 0..M {
-            for k in 0..M {
-                add::<D, D>(&mut excess.data.0[column], -noise[(k, column)], &gains[k]);
+        for (row, column) in excess.iter_mut().enumerate() {
+            subtract::<D, D, M>(column, gains, |k| noise[(k, row)]);
+        }
+        for (index, column) in corrected.0.data.0.iter_mut().enumerate() {
+            let p_ht = |k| p_ht[(index, k)];
+            let gain = |k| gain[(index, k)];
+            // As many rows as reach the diagonal, in lengths that are known.
+            if index < 4 && D > 4 {
+                subtract::<D, 4, M>(column, gains, p_ht);
+                subtract::<D, 4, M>(column, &excess, gain);
+            } else if index < 8 && D > 8 {
+                subtract::<D, 8, M>(column, gains, p_ht);
+                subtract::<D, 8, M>(column, &excess, gain);
+            } else {
+                subtract::<D, D, M>(column, gains, p_ht);
+                subtract::<D, D, M>(column, &excess, gain);
             }
         }
-        for column in 0..D {
-            for k in 0..M {
-                add::<D, D>(&mut a.data.0[column], -gain[(column, k)], &excess.data.0[k]);
-            }
-        }
-        mirror(&mut a);
-        put_back_negative_variances(&mut a);
-        Self(a)
+        mirror(&mut corrected.0);
+        put_back_negative_variances(&mut corrected.0);
+        corrected
     }
 
     /// `factor * P`.

@@ -40,8 +40,11 @@ fn times<const D: usize, const M: usize>(
     let mut product = SMatrix::<f64, M, D>::zeros();
     for k in (0..D).filter(|k| sees(h, *k)) {
         for column in 0..D {
-            for row in 0..M {
-                product[(row, column)] += h[(row, k)] * j[(k, column)];
+            let factor = j[(k, column)];
+            if factor != 0.0 {
+                for row in 0..M {
+                    product[(row, column)] += h[(row, k)] * factor;
+                }
             }
         }
     }

@@ -157,6 +157,9 @@ impl core::error::Error for UpdateError {}
 impl<const D: usize> Iterate<D> {
     /// The point at `fraction` of the way to `other`.
     fn towards(&self, other: &Self, fraction: f64) -> Self {
+        if fraction == 1.0 {
+            return *other;
+        }
         Self {
             xi: self.xi * (1.0 - fraction) + other.xi * fraction,
             eta: self.eta * (1.0 - fraction) + other.eta * fraction,
@@ -271,13 +274,14 @@ where
     let gain = rule.gain(&belief.covariance, &linearised)?;
     let mut covariance = rule.covariance(&belief.covariance, &linearised, &gain)?;
     if options.transport == Transport::Jacobian {
-        covariance = covariance.transformed(&S::jacobian::<G, D>(&current.xi));
+        covariance.transform_by::<G>(&S::jacobian::<G, D>(&current.xi));
     }
-    let corrected = Belief::new(chi.normalized(), covariance);
-    if !corrected.is_plausible() {
+    let mean = chi.normalized();
+    if !(mean.is_finite() && covariance.is_plausible()) {
         return Err(UpdateError::NotFinite);
     }
-    *belief = corrected;
+    belief.mean = mean;
+    belief.covariance = covariance;
     Ok(Correction {
         verdict: Verdict::Accepted,
         nis,

@@ -21,7 +21,7 @@ use nalgebra::{SMatrix, SVector};
 mod se2;
 mod se23;
 mod se3;
-mod sek3;
+pub(crate) mod sek3;
 pub mod series;
 mod so2;
 mod so3;
@@ -78,6 +78,14 @@ pub trait LieGroup<const D: usize>: Copy + Clone + Debug + PartialEq {
     /// The inverse of the right Jacobian. It exists while the rotation is below 2 pi, and is exact there.
     fn right_jacobian_inverse(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
         Self::left_jacobian_inverse(&-xi)
+    }
+
+    /// Makes the symmetric matrix P `A P A^T`, exactly symmetric, where A has zeros wherever the adjoint, `ad` or
+    /// the Jacobians of this group have them (identity where they have one). Groups that know their zeros are
+    /// faster than this.
+    fn congruence(p: &mut SMatrix<f64, D, D>, a: &SMatrix<f64, D, D>) {
+        *p = a * *p * a.transpose();
+        p.fill_lower_triangle_with_upper_triangle();
     }
 
     /// Whether every stored number is finite.

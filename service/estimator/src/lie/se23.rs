@@ -32,6 +32,7 @@ impl LieGroup<9> for SE23 {
         }
     }
 
+    #[inline]
     fn exp(xi: &SVector<f64, 9>) -> Self {
         let phi = sek3::part(xi, 0);
         let series = RotationSeries::at(&phi);
@@ -48,6 +49,7 @@ impl LieGroup<9> for SE23 {
         sek3::join(&phi, &rho)
     }
 
+    #[inline]
     fn compose(&self, other: &Self) -> Self {
         Self {
             rotation: self.rotation * other.rotation,
@@ -56,6 +58,7 @@ impl LieGroup<9> for SE23 {
         }
     }
 
+    #[inline]
     fn inverse(&self) -> Self {
         Self {
             rotation: self.rotation.inverse(),
@@ -80,12 +83,18 @@ impl LieGroup<9> for SE23 {
         sek3::left_jacobian_inverse::<2, 9>(xi)
     }
 
+    fn congruence(p: &mut SMatrix<f64, 9, 9>, a: &SMatrix<f64, 9, 9>) {
+        sek3::congruence::<9, 9>(p, a);
+    }
+
+    #[inline]
     fn is_finite(&self) -> bool {
         self.rotation.is_finite()
             && self.velocity.iter().all(|entry| entry.is_finite())
             && self.position.iter().all(|entry| entry.is_finite())
     }
 
+    #[inline]
     fn normalized(&self) -> Self {
         Self {
             rotation: self.rotation.normalized(),

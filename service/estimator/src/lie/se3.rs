@@ -74,6 +74,10 @@ impl LieGroup<6> for SE3 {
         sek3::left_jacobian_inverse::<1, 6>(xi)
     }
 
+    fn congruence(p: &mut SMatrix<f64, 6, 6>, a: &SMatrix<f64, 6, 6>) {
+        sek3::congruence::<6, 6>(p, a);
+    }
+
     fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.position.iter().all(|entry| entry.is_finite())
     }

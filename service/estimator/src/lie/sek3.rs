@@ -9,11 +9,13 @@ use super::so3::{SO3, hat};
 use super::{LieGroup, series::RotationSeries};
 
 /// The three entries of a tangent vector that begin at `start`.
+#[inline]
 pub(super) fn part<const D: usize>(xi: &SVector<f64, D>, start: usize) -> Vector3<f64> {
     Vector3::new(xi[start], xi[start + 1], xi[start + 2])
 }
 
 /// The tangent vector with the given parts.
+#[inline]
 pub(super) fn join<const K: usize, const D: usize>(
     phi: &Vector3<f64>,
     rho: &[Vector3<f64>; K],
@@ -30,6 +32,7 @@ pub(super) fn join<const K: usize, const D: usize>(
 }
 
 /// The parts of a tangent vector: the rotation, and the `K` others.
+#[inline]
 fn split<const K: usize, const D: usize>(
     xi: &SVector<f64, D>,
 ) -> (Vector3<f64>, [Vector3<f64>; K]) {
@@ -38,6 +41,7 @@ fn split<const K: usize, const D: usize>(
 }
 
 /// The matrix with `diagonal` in every diagonal block and `below` under the first one.
+#[inline]
 fn arrow<const K: usize, const D: usize>(
     diagonal: &Matrix3<f64>,
     below: &[Matrix3<f64>; K],
@@ -98,4 +102,63 @@ pub(super) fn left_jacobian_inverse<const K: usize, const D: usize>(
         &inverse,
         &rho.map(|rho| -(inverse * series.gamma_along::<1>(&rho) * inverse)),
     )
+}
+
+/// `A P A^T` of a symmetric P in place, for an arrow A on the first COUPLED of D coordinates and the identity on
+/// the others.
+///
+/// `T = P A^T` combines columns of P, whole; `A T` then needs only the upper triangle of what A touches.
+pub(crate) fn congruence<const D: usize, const COUPLED: usize>(
+    p: &mut SMatrix<f64, D, D>,
+    a: &SMatrix<f64, D, D>,
+) {
+    const { assert!(COUPLED <= D && COUPLED % 3 == 0) };
+    let p = &mut p.data.0;
+    let mut t = [[0.0; D]; COUPLED];
+    for (i, column) in t.iter_mut().enumerate().take(3) {
+        let f = [a[(i, 0)], a[(i, 1)], a[(i, 2)]];
+        for row in 0..D {
+            column[row] = f[0] * p[0][row] + f[1] * p[1][row] + f[2] * p[2][row];
+        }
+    }
+    for (i, column) in t.iter_mut().enumerate().skip(3) {
+        let start = i - i % 3;
+        let f = [a[(i, 0)], a[(i, 1)], a[(i, 2)]];
+        let g = [a[(i, start)], a[(i, start + 1)], a[(i, start + 2)]];
+        let [x, y, z] = [&p[start], &p[start + 1], &p[start + 2]];
+        for row in 0..D {
+            column[row] = f[0] * p[0][row]
+                + f[1] * p[1][row]
+                + f[2] * p[2][row]
+                + g[0] * x[row]
+                + g[1] * y[row]
+                + g[2] * z[row];
+        }
+    }
+    for (index, t) in t.iter().enumerate() {
+        let last = index - index % 3;
+        for i in 0..3 {
+            let entry = a[(i, 0)] * t[0] + a[(i, 1)] * t[1] + a[(i, 2)] * t[2];
+            p[index][i] = entry;
+        }
+        for start in (3..=last).step_by(3) {
+            for i in start..start + 3 {
+                p[index][i] = a[(i, 0)] * t[0]
+                    + a[(i, 1)] * t[1]
+                    + a[(i, 2)] * t[2]
+                    + a[(i, start)] * t[start]
+                    + a[(i, start + 1)] * t[start + 1]
+                    + a[(i, start + 2)] * t[start + 2];
+            }
+        }
+        p[index][COUPLED..].copy_from_slice(&t[COUPLED..]);
+    }
+    for column in 0..COUPLED {
+        for row in 0..column {
+            p[row][column] = p[column][row];
+        }
+        for row in COUPLED..D {
+            p[row][column] = p[column][row];
+        }
+    }
 }

@@ -70,12 +70,14 @@ const fn coefficients<const TERMS: usize>(k: usize) -> [f64; TERMS] {
     table
 }
 
+#[inline]
 fn horner<const TERMS: usize>(coefficients: &[f64; TERMS], t: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * t + c)
 }
 
 /// `S_0 ..= S_6` at `t = theta^2 >= 0`, each to double precision.
 #[must_use]
+#[inline]
 pub fn entire(t: f64) -> [f64; COUNT] {
     const C5_SMALL: [f64; TERMS_SMALL] = coefficients(5);
     const C6_SMALL: [f64; TERMS_SMALL] = coefficients(6);
@@ -103,6 +105,7 @@ pub fn entire(t: f64) -> [f64; COUNT] {
 
 /// `S_0 = cos(theta)` and `S_1 = sin(theta) / theta` alone, at `t = theta^2 >= 0`.
 #[must_use]
+#[inline]
 pub fn cos_sinc(t: f64) -> (f64, f64) {
     const TERMS: usize = 7;
     const C0: [f64; TERMS] = coefficients(0);
@@ -122,6 +125,7 @@ pub fn cos_sinc(t: f64) -> (f64, f64) {
 /// `c = (1 - (theta/2) cot(theta/2)) / t`, written with `u = t/4` as `(S_2(u) - S_3(u)) / (4 S_1(u))`: no
 /// difference of nearly equal numbers at 0, and no division by `sin(pi)`. It is infinite at 2 pi.
 #[must_use]
+#[inline]
 pub fn inverse_jacobian_coefficient(t: f64) -> f64 {
     let s = entire(0.25 * t);
     0.25 * (s[2] - s[3]) / s[1]
@@ -139,6 +143,7 @@ pub struct RotationSeries {
 impl RotationSeries {
     /// Evaluates the functions at the rotation vector `phi`, in radians.
     #[must_use]
+    #[inline]
     pub fn at(phi: &Vector3<f64>) -> Self {
         Self {
             phi: *phi,
@@ -153,12 +158,14 @@ impl RotationSeries {
     }
 
     /// `dS_k/dt` for `k <= 4`.
+    #[inline]
     fn derivative(&self, k: usize) -> f64 {
         -0.5 * (self.s[k + 1] - k as f64 * self.s[k + 2])
     }
 
     /// The matrix `Gamma_M(phi)`.
     #[must_use]
+    #[inline]
     pub fn gamma<const M: usize>(&self) -> Matrix3<f64> {
         const { assert!(M <= 2) };
         let p = &self.phi;
@@ -174,6 +181,7 @@ impl RotationSeries {
 
     /// The vector `Gamma_M(phi) a`, without forming the matrix.
     #[must_use]
+    #[inline]
     pub fn gamma_times<const M: usize>(&self, a: &Vector3<f64>) -> Vector3<f64> {
         const { assert!(M <= 2) };
         let p_a = self.phi.cross(a);
@@ -184,6 +192,7 @@ impl RotationSeries {
     ///
     /// Column `j` is the change of the vector per radian of `phi_j`.
     #[must_use]
+    #[inline]
     pub fn gamma_times_derivative<const M: usize>(&self, a: &Vector3<f64>) -> Matrix3<f64> {
         const { assert!(M <= 2) };
         let p = &self.phi;
@@ -208,6 +217,7 @@ impl RotationSeries {
     /// (Barfoot and Furgale 2014), whose quartic products collapse by
     /// `hat(a) hat(b) hat(a) = -(a . b) hat(a)`.
     #[must_use]
+    #[inline]
     pub fn gamma_along<const M: usize>(&self, rho: &Vector3<f64>) -> Matrix3<f64> {
         const { assert!(M <= 2) };
         let p = &self.phi;
@@ -234,6 +244,7 @@ pub fn gamma<const M: usize>(phi: &Vector3<f64>) -> Matrix3<f64> {
 
 /// The derivative of `Gamma_M(phi) a` by `phi`; see [`RotationSeries::gamma_times_derivative`].
 #[must_use]
+#[inline]
 pub fn gamma_times_derivative<const M: usize>(
     phi: &Vector3<f64>,
     a: &Vector3<f64>,

@@ -14,6 +14,7 @@ const MATRIX_TOLERANCE: f64 = 0.1;
 
 /// The skew matrix of a vector: `hat(a) b = a x b`.
 #[must_use]
+#[inline]
 pub fn hat(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
 }
@@ -114,6 +115,7 @@ impl SO3 {
 
     /// The rotation matrix, body to world: its columns are the body's axes in world coordinates.
     #[must_use]
+    #[inline]
     pub fn matrix(&self) -> Matrix3<f64> {
         let [x, y, z, w] = self.quaternion_xyzw();
         let (x2, y2, z2) = (x + x, y + y, z + z);
@@ -131,6 +133,7 @@ impl SO3 {
 
     /// Takes a vector from body to world coordinates, `R a`.
     #[must_use]
+    #[inline]
     pub fn rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
         let twice = 2.0 * self.vector.cross(a);
         a + self.w * twice + self.vector.cross(&twice)
@@ -138,6 +141,7 @@ impl SO3 {
 
     /// Takes a vector from world to body coordinates, `R^T a`.
     #[must_use]
+    #[inline]
     pub fn inverse_rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
         let twice = 2.0 * self.vector.cross(a);
         a - self.w * twice + self.vector.cross(&twice)
@@ -145,6 +149,7 @@ impl SO3 {
 }
 
 /// `Jl(phi)^-1 a_i` on SO(3), without forming the matrix.
+#[inline]
 pub(super) fn left_jacobian_inverse_times<const K: usize>(
     phi: &Vector3<f64>,
     vectors: &[Vector3<f64>; K],
@@ -173,6 +178,7 @@ impl LieGroup<3> for SO3 {
         }
     }
 
+    #[inline]
     fn exp(phi: &Vector3<f64>) -> Self {
         let (cos, sinc) = cos_sinc(0.25 * phi.norm_squared());
         Self {
@@ -181,6 +187,7 @@ impl LieGroup<3> for SO3 {
         }
     }
 
+    #[inline]
     fn log(&self) -> Vector3<f64> {
         // Of the two quaternions, the one whose half angle is at most pi/2.
         let (vector, w) = if self.w < 0.0 {
@@ -197,6 +204,7 @@ impl LieGroup<3> for SO3 {
         (2.0 * sin.atan2(w) / sin) * vector
     }
 
+    #[inline]
     fn compose(&self, other: &Self) -> Self {
         let vector =
             self.w * other.vector + other.w * self.vector + self.vector.cross(&other.vector);
@@ -209,6 +217,7 @@ impl LieGroup<3> for SO3 {
         }
     }
 
+    #[inline]
     fn inverse(&self) -> Self {
         Self {
             vector: -self.vector,
@@ -224,10 +233,12 @@ impl LieGroup<3> for SO3 {
         hat(phi)
     }
 
+    #[inline]
     fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
         RotationSeries::at(phi).gamma::<1>()
     }
 
+    #[inline]
     fn left_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
         let t = phi.norm_squared();
         let c = inverse_jacobian_coefficient(t);
@@ -243,6 +254,7 @@ impl LieGroup<3> for SO3 {
         self.w.is_finite() && self.vector.iter().all(|entry| entry.is_finite())
     }
 
+    #[inline]
     fn normalized(&self) -> Self {
         let scale = 1.0 / (self.vector.norm_squared() + self.w * self.w).sqrt();
         Self {

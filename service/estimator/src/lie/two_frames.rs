@@ -112,6 +112,10 @@ impl LieGroup<15> for TwoFrames {
         sek3::left_jacobian_inverse::<4, 15>(xi)
     }
 
+    fn congruence(p: &mut SMatrix<f64, 15, 15>, a: &SMatrix<f64, 15, 15>) {
+        sek3::congruence::<15, 15>(p, a);
+    }
+
     fn is_finite(&self) -> bool {
         let vectors = [
             self.velocity,

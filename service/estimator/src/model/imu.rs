@@ -34,6 +34,7 @@ pub struct ImuInput {
 
 impl ImuInput {
     /// The mean of two inputs.
+    #[inline]
     pub fn midpoint(&self, other: &Self) -> Self {
         Self {
             omega_b: 0.5 * (self.omega_b + other.omega_b),

@@ -99,7 +99,7 @@ impl ImuIncrement {
         Transition {
             dt_s: self.dt_s,
             turn: Some(self.turn_matrix.transpose()),
-            couplings: self.body.map(|part| -part),
+            couplings: [-self.body[0], -self.body[1]],
             by_rate: self.by_rate,
             by_force: self.by_force,
         }
@@ -158,7 +158,8 @@ pub(super) fn moved(
     body: &[Vector3<f64>; 2],
     world: &[Vector3<f64>; 2],
 ) -> SE23 {
-    let [velocity, position] = body.each_ref().map(|part| pose.rotation.rotate(part));
+    let velocity = pose.rotation.rotate(&body[0]);
+    let position = pose.rotation.rotate(&body[1]);
     SE23 {
         rotation: pose.rotation.compose(turn),
         velocity: pose.velocity + world[0] + velocity,

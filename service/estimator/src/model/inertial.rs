@@ -12,18 +12,23 @@ use crate::lie::{LieGroup, SE23};
 /// A Lie group whose first nine tangent coordinates are those of SE_2(3).
 pub trait InertialState<const D: usize>: LieGroup<D> {
     /// Attitude, velocity and position.
+    #[inline]
     fn pose(&self) -> &SE23;
 
     /// Gyroscope bias, rad/s, body frame; zero where the state has none.
+    #[inline]
     fn gyro_bias(&self) -> Vector3<f64>;
 
     /// Accelerometer bias, m/s^2, body frame; zero where the state has none.
+    #[inline]
     fn accel_bias(&self) -> Vector3<f64>;
 
     /// The state with these parts; biases are dropped where the state has none.
+    #[inline]
     fn from_parts(pose: SE23, gyro_bias: Vector3<f64>, accel_bias: Vector3<f64>) -> Self;
 
     /// The state after one increment; biases stay.
+    #[inline]
     fn moved(&self, increment: &ImuIncrement) -> Self {
         Self::from_parts(
             increment.apply(self.pose()),
@@ -44,6 +49,7 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
     ) -> (Self, SMatrix<f64, D, D>, SMatrix<f64, D, D>);
 
     /// The motion that the raw sample `measured` says, the biases of this state removed.
+    #[inline]
     fn increment(
         &self,
         measured: &ImuInput,
@@ -71,18 +77,22 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
 }
 
 impl InertialState<9> for SE23 {
+    #[inline]
     fn pose(&self) -> &SE23 {
         self
     }
 
+    #[inline]
     fn gyro_bias(&self) -> Vector3<f64> {
         Vector3::zeros()
     }
 
+    #[inline]
     fn accel_bias(&self) -> Vector3<f64> {
         Vector3::zeros()
     }
 
+    #[inline]
     fn from_parts(pose: SE23, _gyro_bias: Vector3<f64>, _accel_bias: Vector3<f64>) -> Self {
         pose
     }

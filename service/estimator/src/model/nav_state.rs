@@ -10,7 +10,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use super::imu::{ImuNoise, ImuStep};
 use super::inertial::InertialState;
 use super::transition::Transition;
-use crate::lie::{LieGroup, SE23};
+use crate::lie::{LieGroup, SE23, sek3};
 
 /// Pose and biases.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +33,7 @@ fn with_identity_on_biases(block: &SMatrix<f64, 9, 9>) -> Matrix15 {
     full
 }
 
+#[inline]
 fn pose_part(xi: &Vector15) -> SVector<f64, 9> {
     xi.fixed_rows::<9>(0).into_owned()
 }
@@ -44,6 +45,7 @@ impl LieGroup<15> for NavState {
         Self::from_parts(SE23::identity(), Vector3::zeros(), Vector3::zeros())
     }
 
+    #[inline]
     fn exp(xi: &Vector15) -> Self {
         Self {
             pose: SE23::exp(&pose_part(xi)),
@@ -60,6 +62,7 @@ impl LieGroup<15> for NavState {
         xi
     }
 
+    #[inline]
     fn compose(&self, other: &Self) -> Self {
         Self {
             pose: self.pose.compose(&other.pose),
@@ -95,12 +98,18 @@ impl LieGroup<15> for NavState {
         with_identity_on_biases(&SE23::left_jacobian_inverse(&pose_part(xi)))
     }
 
+    fn congruence(p: &mut Matrix15, a: &Matrix15) {
+        sek3::congruence::<15, 9>(p, a);
+    }
+
+    #[inline]
     fn is_finite(&self) -> bool {
         self.pose.is_finite()
             && self.gyro_bias.iter().all(|value| value.is_finite())
             && self.accel_bias.iter().all(|value| value.is_finite())
     }
 
+    #[inline]
     fn normalized(&self) -> Self {
         Self {
             pose: self.pose.normalized(),
@@ -110,18 +119,22 @@ impl LieGroup<15> for NavState {
 }
 
 impl InertialState<15> for NavState {
+    #[inline]
     fn pose(&self) -> &SE23 {
         &self.pose
     }
 
+    #[inline]
     fn gyro_bias(&self) -> Vector3<f64> {
         self.gyro_bias
     }
 
+    #[inline]
     fn accel_bias(&self) -> Vector3<f64> {
         self.accel_bias
     }
 
+    #[inline]
     fn from_parts(pose: SE23, gyro_bias: Vector3<f64>, accel_bias: Vector3<f64>) -> Self {
         Self {
             pose,

@@ -130,26 +130,39 @@ impl Transition {
                 let factors = [self.dt_s, c_2[j], -c_2[k]];
                 t[6 + i] = combined(&p[6 + i], factors, [nu, phi_k, phi_j]);
             } else {
-                let bias: [&Column<D>; INPUTS] = core::array::from_fn(|n| &p[POSE + n]);
-                let [rate_x, rate_y, rate_z, force_x, force_y, force_z] = bias;
-                let [x, y, z, u, v, w] = inputs.each_ref().map(|column| -column[i]);
-                let _ = (u, v, w);
-                t[i] = combined(&p[i], [x, y, z], [rate_x, rate_y, rate_z]);
-                let [x, y, z, u, v, w] = inputs.each_ref().map(|column| -column[3 + i]);
-                t[3 + i] = combined(
+                let b = |n: usize| &p[POSE + n];
+                let f = |n: usize, row: usize| -inputs[n][row];
+                t[i] = combined(&p[i], [f(0, i), f(1, i), f(2, i)], [b(0), b(1), b(2)]);
+                let r = 3 + i;
+                t[r] = combined(
                     nu,
-                    [c_1[j], -c_1[k], x, y, z, u, v, w],
                     [
-                        phi_k, phi_j, rate_x, rate_y, rate_z, force_x, force_y, force_z,
+                        c_1[j],
+                        -c_1[k],
+                        f(0, r),
+                        f(1, r),
+                        f(2, r),
+                        f(3, r),
+                        f(4, r),
+                        f(5, r),
                     ],
+                    [phi_k, phi_j, b(0), b(1), b(2), b(3), b(4), b(5)],
                 );
-                let [x, y, z, u, v, w] = inputs.each_ref().map(|column| -column[6 + i]);
-                t[6 + i] = combined(
-                    &p[6 + i],
-                    [self.dt_s, c_2[j], -c_2[k], x, y, z, u, v, w],
+                let r = 6 + i;
+                t[r] = combined(
+                    &p[r],
                     [
-                        nu, phi_k, phi_j, rate_x, rate_y, rate_z, force_x, force_y, force_z,
+                        self.dt_s,
+                        c_2[j],
+                        -c_2[k],
+                        f(0, r),
+                        f(1, r),
+                        f(2, r),
+                        f(3, r),
+                        f(4, r),
+                        f(5, r),
                     ],
+                    [nu, phi_k, phi_j, b(0), b(1), b(2), b(3), b(4), b(5)],
                 );
             }
         }

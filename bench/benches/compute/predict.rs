@@ -3,7 +3,7 @@
 use core::hint::black_box;
 
 use criterion::Criterion;
-use inekf::filter::{Belief, Left, Right, Side, propagate};
+use inekf::filter::{Belief, Left, Right, Side, propagate_in_place};
 use inekf::lie::SE23;
 use inekf::model::{Discretisation, InertialState, NavState};
 
@@ -15,7 +15,7 @@ fn step<G: InertialState<D>, S: Side, const D: usize>(
     discretisation: Discretisation,
 ) {
     let measured = black_box(sample());
-    *belief = propagate(belief, &measured, &GRAVITY_W, DT_S, discretisation, &NOISE);
+    propagate_in_place(belief, &measured, &GRAVITY_W, DT_S, discretisation, &NOISE);
 }
 
 fn pair<G: InertialState<D>, S: Side, const D: usize>(
@@ -35,7 +35,12 @@ fn pair<G: InertialState<D>, S: Side, const D: usize>(
     in_place(&mut group, &format!("{name}/euler"), start, |belief| {
         step(belief, euler)
     });
-    in_place(&mut group, &format!("{name}/dense"), start, dense::propagate);
+    in_place(
+        &mut group,
+        &format!("{name}/dense"),
+        start,
+        dense::propagate,
+    );
     group.finish();
 }
 
@@ -45,8 +50,7 @@ pub fn bench(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("predict");
     in_place(&mut group, "mean", state().pose, |pose| {
         *pose = pose
-            .imu_step(&black_box(sample()), &GRAVITY_W, DT_S, zoh)
-            .step
+            .increment(&black_box(sample()), &GRAVITY_W, DT_S, zoh)
             .apply(pose);
     });
     group.finish();

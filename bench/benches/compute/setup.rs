@@ -74,11 +74,7 @@ pub fn in_place<T: Copy>(
     mut change: impl FnMut(&mut T),
 ) {
     group.bench_function(name, |bencher| {
-        bencher.iter_batched_ref(
-            || start,
-            &mut change,
-            BatchSize::NumIterations(BATCH),
-        );
+        bencher.iter_batched_ref(|| start, &mut change, BatchSize::NumIterations(BATCH));
     });
 }
 

@@ -26,6 +26,7 @@
 //! lissage*).
 #![forbid(unsafe_code)]
 
+mod columns;
 pub mod filter;
 pub mod lie;
 pub mod model;

@@ -7,7 +7,9 @@
 
 use std::collections::VecDeque;
 
-use inekf::filter::{Belief, Correction, Side, UpdateError, UpdateOptions, Verdict, propagate};
+use inekf::filter::{
+    Belief, Correction, Side, UpdateError, UpdateOptions, Verdict, propagate_in_place,
+};
 use inekf::model::{ImuInput, InertialState};
 use inekf_shared::message::MAX_SOURCES;
 
@@ -271,7 +273,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
         let move_to = |belief: &mut Belief<G, S, D>, now_ns: &mut u64, to_ns: u64| {
             if to_ns > *now_ns {
                 let dt_s = seconds(to_ns - *now_ns);
-                *belief = propagate(belief, &held, &g_w, dt_s, discretisation, &noise);
+                propagate_in_place(belief, &held, &g_w, dt_s, discretisation, &noise);
                 *now_ns = to_ns;
             }
         };

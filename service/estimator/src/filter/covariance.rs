@@ -7,6 +7,7 @@
 use nalgebra::{ArrayStorage, SMatrix, SVector};
 
 use super::linearised::sees;
+use crate::columns::{Column, combined};
 use crate::lie::LieGroup;
 
 /// A symmetric D x D matrix, meant positive semidefinite.
@@ -30,33 +31,22 @@ fn put_back_negative_variances<const D: usize>(matrix: &mut SMatrix<f64, D, D>) 
     }
 }
 
-/// A column of D rows.
-type Column<const D: usize> = [f64; D];
-
-/// `column + factor * other`, over the first ROWS rows.
+/// `column + factor * other`, in place.
 #[inline(always)]
-fn add<const D: usize, const ROWS: usize>(column: &mut Column<D>, factor: f64, other: &Column<D>) {
-    for row in 0..ROWS {
-        column[row] += factor * other[row];
-    }
+fn add<const D: usize>(column: &mut Column<D>, factor: f64, other: &Column<D>) {
+    *column = combined::<D, D, D, 1>(column, [factor], [other]);
 }
 
-/// `column - sum_k factor(k) others_k`, over the first ROWS rows.
+/// The first ROWS rows of `column - others row^T`, `row` being a row of `factors`.
 #[inline(always)]
-fn subtract<const D: usize, const ROWS: usize, const M: usize>(
-    column: &mut Column<D>,
+fn without<const ROWS: usize, const D: usize, const M: usize>(
+    column: &Column<D>,
+    factors: &[Column<D>; M],
+    row: usize,
     others: &[Column<D>; M],
-    factor: impl Fn(usize) -> f64,
-) {
-    let mut factors = [0.0; M];
-    for k in 0..M {
-        factors[k] = factor(k);
-    }
-    for row in 0..ROWS {
-        for k in 0..M {
-            column[row] -= factors[k] * others[k][row];
-        }
-    }
+) -> Column<D> {
+    let factors = core::array::from_fn(|k| -factors[k][row]);
+    combined::<ROWS, D, D, M>(column, factors, others.each_ref())
 }
 
 /// `A H^T`. A sensor sees few of the states: the others are passed over.
@@ -67,7 +57,7 @@ fn times_transposed<const D: usize, const M: usize>(
     let mut product = [[0.0; D]; M];
     for k in (0..D).filter(|k| sees(h, *k)) {
         for (row, column) in product.iter_mut().enumerate() {
-            add::<D, D>(column, h[(row, k)], &a.data.0[k]);
+            add(column, h[(row, k)], &a.data.0[k]);
         }
     }
     SMatrix::from_array_storage(ArrayStorage(product))
@@ -84,7 +74,7 @@ fn half_transformed<const D: usize>(
         for k in 0..D {
             let factor = a[(row, k)];
             if factor != 0.0 {
-                add::<D, D>(column, factor, &b.data.0[k]);
+                add(column, factor, &b.data.0[k]);
             }
         }
     }
@@ -162,34 +152,32 @@ impl<const D: usize> Covariance<D> {
         h: &SMatrix<f64, M, D>,
         noise: &SMatrix<f64, M, M>,
     ) -> Self {
-        let gains = &gain.data.0;
+        let (p_ht, gains) = (&p_ht.data.0, &gain.data.0);
         let mut corrected = *self;
         // A H^T - K N, of which A is needed in the columns of the states that are seen.
         let mut excess = [[0.0; D]; M];
         for state in (0..D).filter(|state| sees(h, *state)) {
-            let mut a = corrected.0.data.0[state];
-            subtract::<D, D, M>(&mut a, gains, |k| p_ht[(state, k)]);
+            let a = without::<D, D, M>(&self.0.data.0[state], p_ht, state, gains);
             for (row, column) in excess.iter_mut().enumerate() {
-                add::<D, D>(column, h[(row, state)], &a);
+                add(column, h[(row, state)], &a);
             }
         }
         for (row, column) in excess.iter_mut().enumerate() {
-            subtract::<D, D, M>(column, gains, |k| noise[(k, row)]);
+            let factors = core::array::from_fn(|k| -noise[(k, row)]);
+            *column = combined::<D, D, D, M>(column, factors, gains.each_ref());
         }
         for (index, column) in corrected.0.data.0.iter_mut().enumerate() {
-            let p_ht = |k| p_ht[(index, k)];
-            let gain = |k| gain[(index, k)];
             // As many rows as reach the diagonal, in lengths that are known.
-            if index < 4 && D > 4 {
-                subtract::<D, 4, M>(column, gains, p_ht);
-                subtract::<D, 4, M>(column, &excess, gain);
+            *column = if index < 4 && D > 4 {
+                let a = without::<4, D, M>(column, p_ht, index, gains);
+                without::<4, D, M>(&a, gains, index, &excess)
             } else if index < 8 && D > 8 {
-                subtract::<D, 8, M>(column, gains, p_ht);
-                subtract::<D, 8, M>(column, &excess, gain);
+                let a = without::<8, D, M>(column, p_ht, index, gains);
+                without::<8, D, M>(&a, gains, index, &excess)
             } else {
-                subtract::<D, D, M>(column, gains, p_ht);
-                subtract::<D, D, M>(column, &excess, gain);
-            }
+                let a = without::<D, D, M>(column, p_ht, index, gains);
+                without::<D, D, M>(&a, gains, index, &excess)
+            };
         }
         mirror(&mut corrected.0);
         put_back_negative_variances(&mut corrected.0);
@@ -206,7 +194,7 @@ impl<const D: usize> Covariance<D> {
         // 0 times what is not finite is NaN, and stays NaN in a sum: no branch for each entry.
         let mut sums = [0.0; D];
         for column in &self.0.data.0 {
-            add::<D, D>(&mut sums, 0.0, column);
+            add(&mut sums, 0.0, column);
         }
         sums.iter().all(|sum| *sum == 0.0) && (0..D).all(|i| self.0[(i, i)] >= 0.0)
     }

@@ -171,6 +171,10 @@ impl<const D: usize> Iterate<D> {
 /// is flat to rounding, a hundred-millionth of a standard deviation from the minimum.
 const COST_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
+/// How much larger a cost may come out without being told apart, in the units of chi-square: a step of a
+/// millionth of a standard deviation. Far from the origin a residual is rounded by more than its own last digit.
+const FLAT_COST: f64 = 1e-12;
+
 /// How many shares of a Gauss-Newton step are tried, each half of the one before.
 const MAX_TRIALS: usize = 11;
 
@@ -236,6 +240,7 @@ where
         });
     }
 
+    let mut current_cost = noise_factor.normalised_square(&linearised.residual);
     let mut iterations = 0;
     loop {
         let target = linearised.residual + linearised.h * current.xi;
@@ -248,14 +253,18 @@ where
         let (next, next_chi) = if options.iterations == 1 || !L::MINIMISES_COST {
             at(1.0)
         } else {
-            let before = cost(&current, &chi) * (1.0 + COST_ROUNDING);
+            let before = current_cost * (1.0 + COST_ROUNDING) + FLAT_COST;
             let shares = core::iter::successors(Some(1.0), |share| Some(0.5 * share));
             let lower = shares
                 .take(MAX_TRIALS)
                 .map(at)
-                .find(|(iterate, chi)| cost(iterate, chi) <= before);
+                .map(|(iterate, chi)| (cost(&iterate, &chi), iterate, chi))
+                .find(|(cost, _, _)| *cost <= before);
             match lower {
-                Some(lower) => lower,
+                Some((lower, iterate, chi)) => {
+                    current_cost = lower;
+                    (iterate, chi)
+                }
                 // At the minimum, as far as rounding lets it be told.
                 None if at(1.0).1.is_finite() => break,
                 None => return Err(UpdateError::NotFinite),

@@ -80,22 +80,22 @@ impl LieGroup<15> for NavState {
     }
 
     fn adjoint(&self) -> Matrix15 {
-        with_identity_on_biases(&self.pose.adjoint())
+        sek3::adjoint(
+            &self.pose.rotation,
+            &[self.pose.velocity, self.pose.position],
+        )
     }
 
     fn ad(xi: &Vector15) -> Matrix15 {
-        let mut full = Matrix15::zeros();
-        full.fixed_view_mut::<9, 9>(0, 0)
-            .copy_from(&SE23::ad(&pose_part(xi)));
-        full
+        sek3::ad::<2, 15>(xi)
     }
 
     fn left_jacobian(xi: &Vector15) -> Matrix15 {
-        with_identity_on_biases(&SE23::left_jacobian(&pose_part(xi)))
+        sek3::left_jacobian::<2, 15>(xi)
     }
 
     fn left_jacobian_inverse(xi: &Vector15) -> Matrix15 {
-        with_identity_on_biases(&SE23::left_jacobian_inverse(&pose_part(xi)))
+        sek3::left_jacobian_inverse::<2, 15>(xi)
     }
 
     fn congruence(p: &mut Matrix15, a: &Matrix15) {

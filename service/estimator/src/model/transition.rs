@@ -19,6 +19,7 @@
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::imu::ImuNoise;
+use crate::columns::{Column, combined};
 
 /// F and the shape of Q of one interval, in the error of one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,27 +40,6 @@ pub struct Transition {
 const POSE: usize = 9;
 /// How many inputs are noisy, and how many biases there are: three rates and three forces.
 const INPUTS: usize = 6;
-
-/// A column of a matrix.
-type Column<const R: usize> = [f64; R];
-
-/// `base + sum_n factors_n columns_n`, over as many rows as `base` has.
-#[inline(always)]
-fn combined<const D: usize, const R: usize, const N: usize>(
-    base: &Column<D>,
-    factors: [f64; N],
-    columns: [&Column<D>; N],
-) -> Column<R> {
-    let mut sum = [0.0; R];
-    for row in 0..D {
-        let mut entry = base[row];
-        for n in 0..N {
-            entry += factors[n] * columns[n][row];
-        }
-        sum[row] = entry;
-    }
-    sum
-}
 
 impl Transition {
     /// Makes P `F P F^T + Q`, exactly symmetric; D = 9 without biases and 15 with them, and R is at least `D + 6`.
@@ -125,16 +105,17 @@ impl Transition {
             // (c x phi)_i = c_j phi_k - c_k phi_j
             let (phi_j, phi_k, nu) = (&p[j], &p[k], &p[3 + i]);
             if D == POSE {
-                t[i] = combined(&p[i], [], []);
-                t[3 + i] = combined(nu, [c_1[j], -c_1[k]], [phi_k, phi_j]);
+                t[i] = combined::<D, D, R, _>(&p[i], [], []);
+                t[3 + i] = combined::<D, D, R, _>(nu, [c_1[j], -c_1[k]], [phi_k, phi_j]);
                 let factors = [self.dt_s, c_2[j], -c_2[k]];
-                t[6 + i] = combined(&p[6 + i], factors, [nu, phi_k, phi_j]);
+                t[6 + i] = combined::<D, D, R, _>(&p[6 + i], factors, [nu, phi_k, phi_j]);
             } else {
                 let b = |n: usize| &p[POSE + n];
                 let f = |n: usize, row: usize| -inputs[n][row];
-                t[i] = combined(&p[i], [f(0, i), f(1, i), f(2, i)], [b(0), b(1), b(2)]);
+                t[i] =
+                    combined::<D, D, R, _>(&p[i], [f(0, i), f(1, i), f(2, i)], [b(0), b(1), b(2)]);
                 let r = 3 + i;
-                t[r] = combined(
+                t[r] = combined::<D, D, R, _>(
                     nu,
                     [
                         c_1[j],
@@ -149,7 +130,7 @@ impl Transition {
                     [phi_k, phi_j, b(0), b(1), b(2), b(3), b(4), b(5)],
                 );
                 let r = 6 + i;
-                t[r] = combined(
+                t[r] = combined::<D, D, R, _>(
                     &p[r],
                     [
                         self.dt_s,

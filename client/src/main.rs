@@ -205,8 +205,12 @@ fn run_replay(arguments: ReplayArguments) -> anyhow::Result<()> {
         late,
         lost,
         rejected,
+        unpaired,
     } = summary.last.counters;
     println!("fixes    {accepted} accepted, {gated} gated, {late} late; {lost} lost");
+    if unpaired > 0 {
+        println!("unpaired {unpaired}: their partner in the stack did not come in time");
+    }
     if rejected > 0 {
         let reasons: Vec<String> = summary
             .last

@@ -8,12 +8,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
-use inekf::filter::{Left, Side};
+use inekf::filter::Left;
 use inekf::lie::SE23;
-use inekf::model::{InertialState, NavState};
+use inekf::model::NavState;
 use inekf_service::config::{Config, Invariance};
 use inekf_service::daemon::{self, Ports};
-use inekf_service::engine::{InertialEngine, Settings};
+use inekf_service::engine::{Engine, InertialEngine, Model, Settings};
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, inspect};
 
@@ -124,22 +124,32 @@ fn serve(file: &Path, instance: &str) -> anyhow::Result<()> {
     ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
         .context("installing the handler of SIGINT and SIGTERM")?;
     match (config.invariance, config.biases) {
-        (Invariance::Left, true) => run::<NavState, Left, 15>(&config, &instance, &stop),
-        (Invariance::Left, false) => run::<SE23, Left, 9>(&config, &instance, &stop),
+        (Invariance::Left, true) => run(
+            InertialEngine::<NavState, Left, 15>::new(Settings::new(&config)),
+            &config,
+            &instance,
+            &stop,
+        ),
+        (Invariance::Left, false) => run(
+            InertialEngine::<SE23, Left, 9>::new(Settings::new(&config)),
+            &config,
+            &instance,
+            &stop,
+        ),
     }
 }
 
-fn run<G: InertialState<D>, S: Side, const D: usize>(
+fn run<M: Model>(
+    mut engine: Engine<M>,
     config: &Config,
     instance: &Instance,
     stop: &AtomicBool,
 ) -> anyhow::Result<()> {
-    let mut engine = InertialEngine::<G, S, D>::new(Settings::new(config));
     let mut ports = Ports::open(instance, config.runtime.wait)?;
     let mut out = std::io::stdout();
     writeln!(
         out,
-        "ready: instance {instance}, process {}, model {}, {D} states, wait {}",
+        "ready: instance {instance}, process {}, model {}, wait {}",
         std::process::id(),
         config.model,
         config.runtime.wait,

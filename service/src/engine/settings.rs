@@ -1,12 +1,14 @@
 //! What the engine needs of the configuration, in SI units and radians.
 
 use inekf::filter::gate::chi_square_quantile;
-use inekf::filter::{BiasPrior, Transport, UpdateOptions};
+use inekf::filter::{Alignment, BiasPrior, Transport, UpdateOptions};
+use inekf::lie::SO3;
 use inekf::model::{Discretisation, ImuNoise};
 use inekf_shared::message::MAX_SOURCES;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::fix::FixKind;
+use super::fix::{Antenna, FixKind};
+use super::stack::StackSettings;
 use crate::config::{self, Config, GapPolicy, Hold, Level, WhiteNoise};
 
 /// The IMU: what it may say, how its samples are held, its noise.
@@ -36,6 +38,42 @@ pub struct ImuSettings {
     pub gap_gyro_sigma: f64,
     /// Doubt about the mean specific force over a gap, m/s^2.
     pub gap_accel_sigma: f64,
+}
+
+impl InitialSettings {
+    /// Whether the start waits for a position fix.
+    pub fn needs_fix(&self) -> bool {
+        self.position == PositionSource::FirstFix
+    }
+
+    /// The parts of the first belief, from an attitude and a position.
+    pub fn alignment(&self, r_wb: SO3, antenna: &Antenna) -> Alignment {
+        Alignment {
+            r_wb,
+            tilt_sigma: self.level_sigma,
+            heading_sigma: self.heading_sigma,
+            velocity_w: self.velocity_w,
+            velocity_sigma: self.velocity_sigma,
+            position_w: antenna.position_w,
+            position_covariance_w: antenna.covariance_w,
+            lever_arm_b: antenna.lever_arm_b,
+            biases: self.biases,
+        }
+    }
+
+    /// The same for a pose that is set rather than measured, without a covariance of its own.
+    pub fn alignment_at(&self, r_wb: SO3, position_w: Vector3<f64>) -> Alignment {
+        let sigma = match self.position {
+            PositionSource::Given { sigma, .. } => sigma,
+            PositionSource::FirstFix => UNSTATED_POSITION_SIGMA,
+        };
+        let here = Antenna {
+            position_w,
+            covariance_w: Matrix3::identity() * (sigma * sigma),
+            lever_arm_b: Vector3::zeros(),
+        };
+        self.alignment(r_wb, &here)
+    }
 }
 
 impl ImuSettings {
@@ -122,6 +160,9 @@ pub struct SourceSettings {
     pub sigma_scale: f64,
 }
 
+/// Largest dimension of a measurement: two positions in space.
+pub const MAX_DIMENSION: usize = 6;
+
 /// The configured sources by kind and id.
 pub type Sources = [[Option<SourceSettings>; MAX_SOURCES]; FixKind::COUNT];
 
@@ -131,7 +172,7 @@ pub struct FusionSettings {
     /// Iterations and transport; its gate is set per fix from the probability.
     pub update: UpdateOptions,
     /// Largest NIS by dimension of the measurement (index 0 unused).
-    pub gate_by_dimension: [f64; 4],
+    pub gate_by_dimension: [f64; MAX_DIMENSION + 1],
     /// After this many gated fixes of a source in a row one is accepted; 0 never.
     pub recover_after: u32,
     /// The configured sources.
@@ -142,6 +183,23 @@ pub struct FusionSettings {
     pub late_capacity: usize,
     /// No accepted fix for this long is degraded.
     pub degraded_after_ns: u64,
+    /// Two position sources that are taken together.
+    pub stack: Option<StackSettings>,
+}
+
+impl FusionSettings {
+    /// How a measurement of this dimension is fused, gated or not.
+    pub fn options(&self, dimension: usize, gated: bool) -> UpdateOptions {
+        let gate = if gated {
+            self.gate_by_dimension[dimension]
+        } else {
+            f64::INFINITY
+        };
+        UpdateOptions {
+            gate,
+            ..self.update
+        }
+    }
 }
 
 /// Everything.
@@ -155,6 +213,8 @@ pub struct Settings {
     pub fusion: FusionSettings,
 }
 
+/// Standard deviation per axis of a position that comes without one, m: the configuration's default.
+const UNSTATED_POSITION_SIGMA: f64 = 10.0;
 /// A restart is certain after a gap this many times `max_gap_s`: no guess about the motion in
 /// between is worth anything then.
 const RESTART_GAPS: u64 = 20;
@@ -272,12 +332,16 @@ fn fusion(config: &Config) -> FusionSettings {
             },
             gate: f64::INFINITY,
         },
-        gate_by_dimension: [f64::INFINITY, gate(1), gate(2), gate(3)],
+        gate_by_dimension: core::array::from_fn(|dimension| match dimension {
+            0 => f64::INFINITY,
+            _ => gate(dimension),
+        }),
         recover_after: config.update.recover_after,
         sources,
         late_window_ns: config.late.window_ns(),
         late_capacity: config.late.capacity,
         degraded_after_ns: config.health.degraded_after_ns(),
+        stack: None,
     }
 }
 

@@ -8,10 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
-use inekf::filter::{Left, Side};
+use inekf::filter::{Left, Right, Side};
 use inekf::lie::SE23;
 use inekf::model::{InertialState, NavState};
-use inekf_service::config::{Config, Invariance};
+use inekf_service::config::{Config, Invariance, Motion};
 use inekf_service::daemon::{self, Ports};
 use inekf_service::engine::{InertialEngine, Settings};
 use inekf_shared::topic::Instance;
@@ -84,7 +84,7 @@ fn check(file: &Path) -> anyhow::Result<()> {
         file.display(),
         config.model,
         config.estimator,
-        if config.biases { 15 } else { 9 }
+        config.error_states(),
     );
     Ok(())
 }
@@ -123,9 +123,15 @@ fn serve(file: &Path, instance: &str) -> anyhow::Result<()> {
     let signalled = Arc::clone(&stop);
     ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
         .context("installing the handler of SIGINT and SIGTERM")?;
-    match (config.invariance, config.biases) {
-        (Invariance::Left, true) => run::<NavState, Left, 15>(&config, &instance, &stop),
-        (Invariance::Left, false) => run::<SE23, Left, 9>(&config, &instance, &stop),
+    let Motion::Inertial(inertial) = &config.motion else {
+        anyhow::bail!("model {} does not run in the daemon yet", config.model);
+    };
+    let right = config.invariance == Some(Invariance::Right);
+    match (right, inertial.biases) {
+        (false, true) => run::<NavState, Left, 15>(&config, &instance, &stop),
+        (false, false) => run::<SE23, Left, 9>(&config, &instance, &stop),
+        (true, true) => run::<NavState, Right, 15>(&config, &instance, &stop),
+        (true, false) => run::<SE23, Right, 9>(&config, &instance, &stop),
     }
 }
 

@@ -7,7 +7,7 @@ use inekf_shared::message::MAX_SOURCES;
 use nalgebra::Vector3;
 
 use super::fix::FixKind;
-use crate::config::{self, Config, GapPolicy, Hold, Level, WhiteNoise};
+use crate::config::{self, Config, GapPolicy, Hold, Inertial, Level, Motion, WhiteNoise};
 
 /// The IMU: what it may say, how its samples are held, its noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,29 +169,33 @@ impl Settings {
     /// The settings that `config` asks for.
     pub fn new(config: &Config) -> Self {
         Self {
-            imu: imu(config),
+            imu: match &config.motion {
+                Motion::Inertial(inertial) => imu(inertial),
+                // An engine of odometry does not read this.
+                Motion::Odometry(_) => imu(&Inertial::default()),
+            },
             initial: initial(config),
             fusion: fusion(config),
         }
     }
 }
 
-fn imu(config: &Config) -> ImuSettings {
-    let max_gap_ns = config.imu.max_gap_ns();
+fn imu(inertial: &Inertial) -> ImuSettings {
+    let max_gap_ns = inertial.imu.max_gap_ns();
     ImuSettings {
-        g_w: Vector3::new(0.0, 0.0, -config.gravity_mps2),
-        discretisation: match config.discretisation {
+        g_w: Vector3::new(0.0, 0.0, -inertial.gravity_mps2),
+        discretisation: match inertial.discretisation {
             config::Discretisation::Zoh => Discretisation::ZeroOrderHold,
             config::Discretisation::Euler => Discretisation::Euler,
         },
-        hold: config.hold,
-        white: config.noise.white,
-        gyro_bias_walk: config.noise.gyro_bias_walk,
-        accel_bias_walk: config.noise.accel_bias_walk,
-        max_gyro: config.imu.max_gyro_rps,
-        max_accel: config.imu.max_accel_mps2,
+        hold: inertial.hold,
+        white: inertial.noise.white,
+        gyro_bias_walk: inertial.noise.gyro_bias_walk,
+        accel_bias_walk: inertial.noise.accel_bias_walk,
+        max_gyro: inertial.imu.max_gyro_rps,
+        max_accel: inertial.imu.max_accel_mps2,
         max_gap_ns,
-        restart_gap_ns: match config.imu.on_gap {
+        restart_gap_ns: match inertial.imu.on_gap {
             GapPolicy::Inflate => max_gap_ns.saturating_mul(RESTART_GAPS),
             GapPolicy::Reinitialise => max_gap_ns,
         },
@@ -252,11 +256,13 @@ fn fusion(config: &Config) -> FusionSettings {
             source.sigma_scale,
         );
     }
-    for source in &config.velocity_sources {
-        place(FixKind::Velocity, source.id, [0.0; 3], source.sigma_scale);
-    }
-    for source in &config.heading_sources {
-        place(FixKind::Heading, source.id, [0.0; 3], source.sigma_scale);
+    if let Motion::Inertial(inertial) = &config.motion {
+        for source in &inertial.velocity_sources {
+            place(FixKind::Velocity, source.id, [0.0; 3], source.sigma_scale);
+        }
+        for source in &inertial.heading_sources {
+            place(FixKind::Heading, source.id, [0.0; 3], source.sigma_scale);
+        }
     }
     let gate = |dimension| match config.update.gate_probability {
         Some(probability) => chi_square_quantile(dimension, probability),

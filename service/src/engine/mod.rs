@@ -4,7 +4,8 @@
 //! The same inputs in the same order give the same bytes. After construction it does not allocate,
 //! lock, log or call the system.
 //!
-//! - [`engine`]: time, order, restarts; [`model`]: what it needs of a model; [`inertial`]: the model `imu`
+//! - [`engine`]: time, order, restarts; [`model`]: what it needs of a model; [`inertial`]: the model `imu`;
+//!   [`odometry`]: the models `odometry2d` and `odometry3d`; [`mod@build`]: from a configuration to one of them
 //! - [`intake`]: checks; [`tally`]: counters; [`time_base`]: jumps of the clock
 //! - [`levelling`], [`set_state`]: the first state
 //! - [`timeline`]: samples, fixes at their own stamps, late ones by replay; [`stack`]: fixes taken together;
@@ -15,12 +16,14 @@
     clippy::module_inception,
     reason = "the engine is what the folder is about"
 )]
+pub mod build;
 pub mod engine;
 pub mod fix;
 pub mod inertial;
 pub mod intake;
 pub mod levelling;
 pub mod model;
+pub mod odometry;
 pub mod output;
 pub mod recovery;
 pub mod set_state;
@@ -30,6 +33,7 @@ pub mod tally;
 pub mod time_base;
 pub mod timeline;
 
+pub use build::{Use, build};
 pub use engine::{Engine, MAX_AHEAD_NS};
 pub use inertial::{Inertial, InertialEngine};
 pub use model::Model;

@@ -8,8 +8,10 @@ use inekf_shared::message::MAX_SOURCES;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fix::{Antenna, FixKind};
-use super::stack::StackSettings;
-use crate::config::{self, Config, GapPolicy, Hold, Level, WhiteNoise};
+use super::stack::{Missing, StackSettings};
+use crate::config::{
+    self, Config, GapPolicy, Hold, Inertial, Level, MissingPartner, Motion, WhiteNoise,
+};
 
 /// The IMU: what it may say, how its samples are held, its noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -158,6 +160,8 @@ pub struct SourceSettings {
     pub lever_arm_b: Vector3<f64>,
     /// Multiplies the standard deviations of its fixes.
     pub sigma_scale: f64,
+    /// The scale error that it is assumed to have.
+    pub scale_error: f64,
 }
 
 /// Largest dimension of a measurement: two positions in space.
@@ -229,29 +233,33 @@ impl Settings {
     /// The settings that `config` asks for.
     pub fn new(config: &Config) -> Self {
         Self {
-            imu: imu(config),
+            imu: match &config.motion {
+                Motion::Inertial(inertial) => imu(inertial),
+                // An engine of odometry does not read this.
+                Motion::Odometry(_) => imu(&Inertial::default()),
+            },
             initial: initial(config),
             fusion: fusion(config),
         }
     }
 }
 
-fn imu(config: &Config) -> ImuSettings {
-    let max_gap_ns = config.imu.max_gap_ns();
+fn imu(inertial: &Inertial) -> ImuSettings {
+    let max_gap_ns = inertial.imu.max_gap_ns();
     ImuSettings {
-        g_w: Vector3::new(0.0, 0.0, -config.gravity_mps2),
-        discretisation: match config.discretisation {
+        g_w: Vector3::new(0.0, 0.0, -inertial.gravity_mps2),
+        discretisation: match inertial.discretisation {
             config::Discretisation::Zoh => Discretisation::ZeroOrderHold,
             config::Discretisation::Euler => Discretisation::Euler,
         },
-        hold: config.hold,
-        white: config.noise.white,
-        gyro_bias_walk: config.noise.gyro_bias_walk,
-        accel_bias_walk: config.noise.accel_bias_walk,
-        max_gyro: config.imu.max_gyro_rps,
-        max_accel: config.imu.max_accel_mps2,
+        hold: inertial.hold,
+        white: inertial.noise.white,
+        gyro_bias_walk: inertial.noise.gyro_bias_walk,
+        accel_bias_walk: inertial.noise.accel_bias_walk,
+        max_gyro: inertial.imu.max_gyro_rps,
+        max_accel: inertial.imu.max_accel_mps2,
         max_gap_ns,
-        restart_gap_ns: match config.imu.on_gap {
+        restart_gap_ns: match inertial.imu.on_gap {
             GapPolicy::Inflate => max_gap_ns.saturating_mul(RESTART_GAPS),
             GapPolicy::Reinitialise => max_gap_ns,
         },
@@ -296,27 +304,31 @@ fn initial(config: &Config) -> InitialSettings {
 
 fn fusion(config: &Config) -> FusionSettings {
     let mut sources = Sources::default();
-    let mut place = |kind: FixKind, id: u32, lever_arm_m: [f64; 3], sigma_scale: f64| {
+    let mut place = |kind: FixKind, id: u32, settings: SourceSettings| {
         if let Some(slot) = sources[kind as usize].get_mut(id as usize) {
-            *slot = Some(SourceSettings {
-                lever_arm_b: lever_arm_m.into(),
-                sigma_scale,
-            });
+            *slot = Some(settings);
         }
     };
     for source in &config.position_sources {
-        place(
-            FixKind::Position,
-            source.id,
-            source.lever_arm_m,
-            source.sigma_scale,
-        );
+        let settings = SourceSettings {
+            lever_arm_b: source.lever_arm_m.into(),
+            sigma_scale: source.sigma_scale,
+            scale_error: source.scale_error,
+        };
+        place(FixKind::Position, source.id, settings);
     }
-    for source in &config.velocity_sources {
-        place(FixKind::Velocity, source.id, [0.0; 3], source.sigma_scale);
-    }
-    for source in &config.heading_sources {
-        place(FixKind::Heading, source.id, [0.0; 3], source.sigma_scale);
+    if let Motion::Inertial(inertial) = &config.motion {
+        let scaled = |sigma_scale| SourceSettings {
+            lever_arm_b: Vector3::zeros(),
+            sigma_scale,
+            scale_error: 0.0,
+        };
+        for source in &inertial.velocity_sources {
+            place(FixKind::Velocity, source.id, scaled(source.sigma_scale));
+        }
+        for source in &inertial.heading_sources {
+            place(FixKind::Heading, source.id, scaled(source.sigma_scale));
+        }
     }
     let gate = |dimension| match config.update.gate_probability {
         Some(probability) => chi_square_quantile(dimension, probability),
@@ -341,7 +353,15 @@ fn fusion(config: &Config) -> FusionSettings {
         late_window_ns: config.late.window_ns(),
         late_capacity: config.late.capacity,
         degraded_after_ns: config.health.degraded_after_ns(),
-        stack: None,
+        stack: config.stacking.as_ref().map(|stacking| StackSettings {
+            sources: stacking.sources,
+            tolerance_ns: stacking.tolerance_ns(),
+            wait_ns: stacking.wait_ns(),
+            missing: match stacking.missing {
+                MissingPartner::Unconstrained => Missing::Unconstrained,
+                MissingPartner::Skip => Missing::Skip,
+            },
+        }),
     }
 }
 

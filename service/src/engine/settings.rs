@@ -1,7 +1,6 @@
 //! What the engine needs of the configuration, in SI units and radians.
 
-use inekf::filter::gate::chi_square_quantile;
-use inekf::filter::{BiasPrior, Transport, UpdateOptions};
+use inekf::filter::{BiasPrior, Gate, Transport, UpdateOptions};
 use inekf::model::{Discretisation, ImuNoise};
 use inekf_shared::message::MAX_SOURCES;
 use nalgebra::Vector3;
@@ -128,10 +127,8 @@ pub type Sources = [[Option<SourceSettings>; MAX_SOURCES]; FixKind::COUNT];
 /// How fixes are fused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FusionSettings {
-    /// Iterations and transport; its gate is set per fix from the probability.
+    /// Iterations, transport and gate.
     pub update: UpdateOptions,
-    /// Largest NIS by dimension of the measurement (index 0 unused).
-    pub gate_by_dimension: [f64; 4],
     /// After this many gated fixes of a source in a row one is accepted; 0 never.
     pub recover_after: u32,
     /// The configured sources.
@@ -258,10 +255,6 @@ fn fusion(config: &Config) -> FusionSettings {
     for source in &config.heading_sources {
         place(FixKind::Heading, source.id, [0.0; 3], source.sigma_scale);
     }
-    let gate = |dimension| match config.update.gate_probability {
-        Some(probability) => chi_square_quantile(dimension, probability),
-        None => f64::INFINITY,
-    };
     FusionSettings {
         update: UpdateOptions {
             iterations: config.update.iterations as usize,
@@ -270,9 +263,11 @@ fn fusion(config: &Config) -> FusionSettings {
                 config::Transport::Jacobian => Transport::Jacobian,
                 config::Transport::None => Transport::None,
             },
-            gate: f64::INFINITY,
+            gate: match config.update.gate_probability {
+                Some(probability) => Gate::of_probability(probability),
+                None => Gate::OPEN,
+            },
         },
-        gate_by_dimension: [f64::INFINITY, gate(1), gate(2), gate(3)],
         recover_after: config.update.recover_after,
         sources,
         late_window_ns: config.late.window_ns(),

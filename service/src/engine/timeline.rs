@@ -7,7 +7,9 @@
 
 use std::collections::VecDeque;
 
-use inekf::filter::{Belief, Correction, Side, UpdateError, UpdateOptions, Verdict, propagate};
+use inekf::filter::{
+    Belief, Correction, Gate, Side, UpdateError, UpdateOptions, Verdict, propagate,
+};
 use inekf::model::{ImuInput, InertialState};
 use inekf_shared::message::MAX_SOURCES;
 
@@ -330,19 +332,14 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
         fresh: bool,
     ) -> Result<Correction<D>, UpdateError> {
         let Entry { fix, widened } = self.entries[index];
-        let dimension = fix.dimension();
         let open = UpdateOptions {
-            gate: f64::INFINITY,
+            gate: Gate::OPEN,
             ..self.fusion.update
         };
         if let (false, Some(widening)) = (fresh, widened) {
             return widening.fuse(&fix, belief, &open);
         }
-        let gated = UpdateOptions {
-            gate: self.fusion.gate_by_dimension[dimension],
-            ..self.fusion.update
-        };
-        let outcome = fix.fuse(belief, &gated);
+        let outcome = fix.fuse(belief, &self.fusion.update);
         if !fresh {
             return outcome;
         }

@@ -20,6 +20,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::belief::Belief;
+use super::gate::Gate;
 use super::propagate::moved;
 use super::side::Left;
 use super::update::{UpdateError, UpdateOptions, Verdict, update};
@@ -109,7 +110,7 @@ where
     /// step's noise, B x B, of the left-invariant error.
     pub fn advance<const N: usize>(
         &mut self,
-        unknowns: &Unknowns<'_>,
+        unknowns: &Unknowns,
         step: &OdometryStep<G>,
         q: &SMatrix<f64, B, B>,
     ) where
@@ -143,7 +144,7 @@ where
         O: Observation<Augmented<G, B, P, D>, D, M>,
     {
         let ungated = UpdateOptions {
-            gate: f64::INFINITY,
+            gate: Gate::OPEN,
             ..self.options
         };
         let mut beliefs = self.beliefs;
@@ -159,7 +160,7 @@ where
             least_nis = least_nis.min(correction.nis);
             logs[j] = self.weights[j].ln() - 0.5 * (correction.nis + correction.log_determinant);
         }
-        if least_nis > self.options.gate {
+        if !self.options.gate.admits(least_nis, M) {
             return Ok(Verdict::Gated);
         }
         let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -44,6 +44,7 @@ pub use constrained::Constrained;
 pub use constraint::Constraints;
 pub use covariance::Covariance;
 pub use gain::{Consider, GainRule, Judgement, Kalman};
+pub use gate::Gate;
 pub use hinf::{HInfinity, HInfinityGain};
 pub use linearised::Linearised;
 pub use propagate::{propagate, propagate_augmented, propagate_odometry};

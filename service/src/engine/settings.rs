@@ -1,7 +1,6 @@
 //! What the engine needs of the configuration, in SI units and radians.
 
-use inekf::filter::gate::chi_square_quantile;
-use inekf::filter::{Alignment, BiasPrior, Transport, UpdateOptions};
+use inekf::filter::{Alignment, BiasPrior, Gate, Transport, UpdateOptions};
 use inekf::lie::SO3;
 use inekf::model::{Discretisation, ImuNoise};
 use inekf_shared::message::MAX_SOURCES;
@@ -164,19 +163,14 @@ pub struct SourceSettings {
     pub scale_error: f64,
 }
 
-/// Largest dimension of a measurement: two positions in space.
-pub const MAX_DIMENSION: usize = 6;
-
 /// The configured sources by kind and id.
 pub type Sources = [[Option<SourceSettings>; MAX_SOURCES]; FixKind::COUNT];
 
 /// How fixes are fused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FusionSettings {
-    /// Iterations and transport; its gate is set per fix from the probability.
+    /// Iterations, transport and gate.
     pub update: UpdateOptions,
-    /// Largest NIS by dimension of the measurement (index 0 unused).
-    pub gate_by_dimension: [f64; MAX_DIMENSION + 1],
     /// After this many gated fixes of a source in a row one is accepted; 0 never.
     pub recover_after: u32,
     /// The configured sources.
@@ -192,15 +186,13 @@ pub struct FusionSettings {
 }
 
 impl FusionSettings {
-    /// How a measurement of this dimension is fused, gated or not.
-    pub fn options(&self, dimension: usize, gated: bool) -> UpdateOptions {
-        let gate = if gated {
-            self.gate_by_dimension[dimension]
-        } else {
-            f64::INFINITY
-        };
+    /// How a measurement is fused, gated or not.
+    pub fn options(&self, gated: bool) -> UpdateOptions {
+        if gated {
+            return self.update;
+        }
         UpdateOptions {
-            gate,
+            gate: Gate::OPEN,
             ..self.update
         }
     }
@@ -330,10 +322,6 @@ fn fusion(config: &Config) -> FusionSettings {
             place(FixKind::Heading, source.id, scaled(source.sigma_scale));
         }
     }
-    let gate = |dimension| match config.update.gate_probability {
-        Some(probability) => chi_square_quantile(dimension, probability),
-        None => f64::INFINITY,
-    };
     FusionSettings {
         update: UpdateOptions {
             iterations: config.update.iterations as usize,
@@ -342,12 +330,11 @@ fn fusion(config: &Config) -> FusionSettings {
                 config::Transport::Jacobian => Transport::Jacobian,
                 config::Transport::None => Transport::None,
             },
-            gate: f64::INFINITY,
+            gate: match config.update.gate_probability {
+                Some(probability) => Gate::of_probability(probability),
+                None => Gate::OPEN,
+            },
         },
-        gate_by_dimension: core::array::from_fn(|dimension| match dimension {
-            0 => f64::INFINITY,
-            _ => gate(dimension),
-        }),
         recover_after: config.update.recover_after,
         sources,
         late_window_ns: config.late.window_ns(),

@@ -36,7 +36,7 @@ pub mod propagate;
 pub mod side;
 pub mod update;
 
-pub use adaptive::{Adaptive, Expected, Mode, STANDARD_MODES, Switching, standard_modes};
+pub use adaptive::{Adaptive, Expected, Mode, STANDARD_MODES, Switching, Weighed, standard_modes};
 pub use additive::Additive;
 pub use alignment::{Alignment, BiasPrior, Levelled};
 pub use belief::Belief;
@@ -44,6 +44,7 @@ pub use constrained::Constrained;
 pub use constraint::Constraints;
 pub use covariance::Covariance;
 pub use gain::{Consider, GainRule, Judgement, Kalman};
+pub use gate::Gate;
 pub use hinf::{HInfinity, HInfinityGain};
 pub use linearised::Linearised;
 pub use propagate::{propagate, propagate_augmented, propagate_odometry};

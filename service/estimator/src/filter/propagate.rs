@@ -44,7 +44,7 @@ where
 /// noise of the step on the pose and the random walk of the parameters, D x D.
 pub fn propagate_augmented<G, S, const B: usize, const P: usize, const D: usize, const N: usize>(
     belief: &Belief<Augmented<G, B, P, D>, S, D>,
-    unknowns: &Unknowns<'_>,
+    unknowns: &Unknowns,
     step: &OdometryStep<G>,
     q: &SMatrix<f64, D, D>,
 ) -> Belief<Augmented<G, B, P, D>, S, D>

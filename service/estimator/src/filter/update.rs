@@ -21,6 +21,7 @@ use nalgebra::{Cholesky, SVector};
 
 use super::belief::Belief;
 use super::gain::{GainRule, Iterate, Judgement, Kalman};
+use super::gate::{Gate, MAX_DEGREES};
 use super::linearised::Linearised;
 use super::side::Side;
 use crate::lie::LieGroup;
@@ -45,8 +46,8 @@ pub struct UpdateOptions {
     pub tolerance: f64,
     /// What happens to the covariance.
     pub transport: Transport,
-    /// An innovation with a larger normalised square than this is refused; infinity accepts all.
-    pub gate: f64,
+    /// What innovation is refused, by the degrees of freedom that the rule leaves it.
+    pub gate: Gate,
 }
 
 impl UpdateOptions {
@@ -55,7 +56,7 @@ impl UpdateOptions {
         iterations: 1,
         tolerance: 0.0,
         transport: Transport::None,
-        gate: f64::INFINITY,
+        gate: Gate::OPEN,
     };
 
     /// The default of this library: iterated, with transport.
@@ -63,7 +64,7 @@ impl UpdateOptions {
         iterations: 10,
         tolerance: 1e-6,
         transport: Transport::Jacobian,
-        gate: f64::INFINITY,
+        gate: Gate::OPEN,
     };
 }
 
@@ -203,6 +204,12 @@ where
     O: Observation<G, D, M>,
     L: GainRule<G, D, M>,
 {
+    const {
+        assert!(
+            M <= MAX_DEGREES,
+            "a gate knows the quantiles of MAX_DEGREES at most"
+        )
+    };
     let noise = observation.noise();
     let noise_factor = Cholesky::new(noise).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
     let cost = |iterate: &Iterate<D>, chi: &G| {
@@ -222,7 +229,7 @@ where
         return Err(UpdateError::NotFinite);
     }
     let log_determinant = linearised.log_determinant();
-    if nis > options.gate {
+    if !options.gate.admits(nis, degrees) {
         return Ok(Correction {
             verdict: Verdict::Gated,
             nis,

@@ -59,4 +59,19 @@ impl<G> OdometryStep<G> {
         }
         direction
     }
+
+    /// `(log Omega, 0)`, D: how the left-invariant error grows with a relative error of the rotation, rad.
+    pub fn turn_direction<const D: usize, const N: usize>(&self) -> SVector<f64, D>
+    where
+        G: RigidPose<D, N>,
+    {
+        let kappa = self.kappa.log();
+        SVector::from_fn(|row, _| {
+            if row < G::ROTATION_DIM {
+                kappa[row]
+            } else {
+                0.0
+            }
+        })
+    }
 }

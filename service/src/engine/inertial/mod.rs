@@ -10,7 +10,7 @@ use inekf_shared::message::{
 use nalgebra::Vector3;
 
 use super::engine::Engine;
-use super::fix::{Fix, Measurement};
+use super::fix::Fix;
 use super::levelling::Levelling;
 use super::model::{Fused, Model, Preceding};
 use super::output::write_triangle;
@@ -193,7 +193,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Model for Inertial<G, S, D> {
         fix: &Fix<Aiding>,
         gated: bool,
     ) -> Result<Fused, UpdateError> {
-        let options = self.fusion.options(fix.measurement.dimension(), gated);
+        let options = self.fusion.options(gated);
         fix.measurement.fuse(belief, &options)
     }
 

@@ -40,6 +40,7 @@ mod noise;
 mod odometry;
 mod operation;
 mod section;
+mod solvable;
 mod sources;
 mod stacking;
 mod suggest;
@@ -133,6 +134,20 @@ impl Config {
         let stacking = Stacking::read_if_given(root, known_ids);
         if model == Some(Model::Imu) {
             root.refuse("stacking", ONLY_ODOMETRY);
+        }
+        if let Some(model) = model
+            && filter.mismatch == Mismatch::Hard
+            && root.is_sound("mismatched")
+            && root.is_sound("stacking")
+            && known_ids.is_some()
+        {
+            solvable::check(
+                root,
+                model,
+                &mismatched,
+                &position_sources,
+                stacking.as_ref(),
+            );
         }
         let estimator = root.is_sound("estimator").then_some(filter.estimator);
         Self {

@@ -3,6 +3,7 @@
 mod dataset;
 mod evaluate;
 mod meta;
+mod models;
 mod plot;
 mod recordings;
 mod simulate;

@@ -4,6 +4,7 @@ mod dataset;
 mod evaluate;
 mod meta;
 mod models;
+mod planar;
 mod plot;
 mod recordings;
 mod simulate;

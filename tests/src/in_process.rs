@@ -18,10 +18,10 @@ use inekf_shared::message::{EstimateSe23, MODEL_IMU, NAV_DIM, StateVector, Zero,
 /// Feeds a dataset to an engine with this configuration; every estimate goes to `outbox`.
 pub fn run(dataset: &Dataset, config: &str, outbox: &mut impl Outbox) -> Tally {
     let config = Config::from_toml_str(config, "the test's").unwrap_or_else(|e| panic!("{e}"));
-    if config.biases {
-        feed::<NavState, Left, 15>(dataset, &config, outbox)
-    } else {
-        feed::<SE23, Left, 9>(dataset, &config, outbox)
+    match config.error_states() {
+        15 => feed::<NavState, Left, 15>(dataset, &config, outbox),
+        9 => feed::<SE23, Left, 9>(dataset, &config, outbox),
+        other => panic!("{other} error states: this feeds an IMU's engine"),
     }
 }
 

@@ -55,6 +55,7 @@ impl Filter {
             refuse_mismatch(root, model, estimator, mismatch);
         }
         if root.is_sound("invariance")
+            && root.is_sound("mismatch")
             && invariance == Invariance::Right
             && matches!(
                 mismatch,

@@ -27,8 +27,8 @@ impl Hinf {
             Some(other) => {
                 let reason = format!("needs estimator = \"invariant-hinf\", not \"{other}\"");
                 root.section("hinf", |hinf| {
-                    Self::read(hinf);
                     hinf.refuse_whole(&reason);
+                    Self::read(hinf);
                 });
                 None
             }

@@ -67,7 +67,7 @@ pub use update::Update;
 pub use walk::KeySpec;
 
 use estimator::Filter;
-use motion::{InertialTop, ONLY_ODOMETRY, Tables};
+use motion::{InertialTop, Tables};
 use section::Section;
 use walk::Walk;
 
@@ -131,10 +131,7 @@ impl Config {
         let ids: Vec<u32> = position_sources.iter().map(|source| source.id).collect();
         let known_ids = root.is_sound("position_source").then_some(&*ids);
         let mismatched = Mismatched::read_all(root, model, filter, known_ids);
-        let stacking = Stacking::read_if_given(root, known_ids);
-        if model == Some(Model::Imu) {
-            root.refuse("stacking", ONLY_ODOMETRY);
-        }
+        let stacking = Stacking::read_if_given(root, model, known_ids);
         if let Some(model) = model
             && filter.mismatch == Mismatch::Hard
             && root.is_sound("mismatched")

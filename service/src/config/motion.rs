@@ -93,17 +93,22 @@ impl InertialTop {
 
 impl Tables {
     pub(super) fn read(root: &mut Section<'_, '_>, model: Option<Model>) -> Self {
-        let tables = Self {
-            imu: root.section("imu", Imu::read),
-            rows: root.section("odometry", Rows::read),
+        let is_odometry = model.map(Model::is_odometry);
+        Self {
+            imu: root.section("imu", |imu| {
+                if is_odometry == Some(true) {
+                    imu.refuse_whole(ONLY_IMU);
+                }
+                Imu::read(imu)
+            }),
+            rows: root.section("odometry", |odometry| {
+                if is_odometry == Some(false) {
+                    odometry.refuse_whole(ONLY_ODOMETRY);
+                }
+                Rows::read(odometry)
+            }),
             noise: root.required_section("noise", |noise| noise::read(noise, model)),
-        };
-        match model {
-            Some(Model::Imu) => root.refuse("odometry", ONLY_ODOMETRY),
-            Some(Model::Odometry3d | Model::Odometry2d) => root.refuse("imu", ONLY_IMU),
-            None => {}
         }
-        tables
     }
 }
 
@@ -115,10 +120,8 @@ impl Motion {
         top: InertialTop,
         tables: Tables,
     ) -> Self {
-        let velocity_sources = VelocitySource::read_all(root);
-        let heading_sources = HeadingSource::read_all(root);
         if model.is_some_and(Model::is_odometry) {
-            root.refuse_all(&["velocity_source", "heading_source"], ONLY_IMU);
+            root.refuse_unread(&["velocity_source", "heading_source"], ONLY_IMU);
             return Self::Odometry(Odometry {
                 rows: tables.rows,
                 noise: tables.noise.1,
@@ -126,8 +129,8 @@ impl Motion {
         }
         let noise = tables.noise.0;
         Self::Inertial(Inertial {
-            velocity_sources,
-            heading_sources,
+            velocity_sources: VelocitySource::read_all(root),
+            heading_sources: HeadingSource::read_all(root),
             ..Inertial::new(top, tables.imu, noise)
         })
     }

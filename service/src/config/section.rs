@@ -292,20 +292,10 @@ impl<'w, 'a> Section<'w, 'a> {
         !faults.any(|fault| fault.key.strip_prefix(&*path).is_some_and(within))
     }
 
-    /// Refuses `name`, if it is given and nothing else is wrong with it, for a reason that lies in another key.
+    /// Refuses `name`, if it is given, for a reason that lies in another key.
     pub(super) fn refuse(&mut self, name: &str, reason: &str) {
-        if let Some((place, value)) = self.entry(name)
-            && self.is_sound(name)
-        {
-            let path = place.path.clone();
-            match value {
-                // The text of a table is no value to quote.
-                DeValue::Table(_) => {
-                    let start = Some(place.key.start);
-                    self.walk.absence(path, start, reason.to_owned(), None);
-                }
-                _ => self.walk.fault(&place, reason.to_owned(), None),
-            }
+        if let Some((place, _)) = self.entry(name) {
+            self.walk.fault(&place, reason.to_owned(), None);
         }
     }
 
@@ -328,9 +318,10 @@ impl<'w, 'a> Section<'w, 'a> {
         }
     }
 
-    /// Refuses this whole table, for a reason that lies elsewhere.
+    /// Refuses this whole table, if it is given, for a reason that lies elsewhere. It is then as if it were not: what
+    /// else is wrong in it does not matter.
     pub(super) fn refuse_whole(&mut self, reason: &str) {
-        if self.table.is_some() {
+        if self.table.take().is_some() {
             let (path, reason) = (self.path.clone(), reason.to_owned());
             self.walk.absence(path, self.start, reason, None);
         }

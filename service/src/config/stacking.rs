@@ -4,8 +4,9 @@
 
 use inekf_shared::message::MAX_SOURCES;
 
-use super::choice::MissingPartner;
+use super::choice::{MissingPartner, Model};
 use super::interval::Interval;
+use super::motion::ONLY_ODOMETRY;
 use super::operation::nanoseconds;
 use super::section::Section;
 
@@ -23,14 +24,20 @@ pub struct Stacking {
 }
 
 impl Stacking {
-    /// Reads the table, if there is one; `known_ids` are those of the sources of position, None if they are not
-    /// known for certain.
+    /// Reads the table, if there is one. `model` and `known_ids`, the ids of the sources of position, are None if they
+    /// are not known for certain.
     pub(super) fn read_if_given(
         root: &mut Section<'_, '_>,
+        model: Option<Model>,
         known_ids: Option<&[u32]>,
     ) -> Option<Self> {
         let given = root.has("stacking");
-        let stacking = root.section("stacking", |stacking| Self::read(stacking, known_ids));
+        let stacking = root.section("stacking", |stacking| {
+            if model == Some(Model::Imu) {
+                stacking.refuse_whole(ONLY_ODOMETRY);
+            }
+            Self::read(stacking, known_ids)
+        });
         given.then_some(stacking)
     }
 

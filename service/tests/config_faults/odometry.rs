@@ -58,7 +58,7 @@ fn the_noise_of_a_row_grows_with_its_time_its_way_and_its_turn() {
 fn each_fault_of_a_file_of_odometry() {
     let plane = "odometry2d";
     let space = "odometry3d";
-    let cases: [(&str, &str, &str, &str, &[&str]); 34] = [
+    let cases: [(&str, &str, &str, &str, &[&str]); 35] = [
         (
             plane,
             "biases = false",
@@ -173,11 +173,18 @@ fn each_fault_of_a_file_of_odometry() {
             &["only for model"],
         ),
         (
-            space,
+            plane,
             "",
-            "[initial]\nvelocity_mps = [0, 0, inf]",
-            "initial.velocity_mps[2]",
-            &["not a finite"],
+            "[imu]\nmax_gap_s = 0\nmax_gap = 1",
+            "imu",
+            &["only for model"],
+        ),
+        (
+            plane,
+            "",
+            "[[velocity_source]]\nid = 9",
+            "velocity_source",
+            &["only for model"],
         ),
         (
             plane,
@@ -290,7 +297,7 @@ fn each_fault_of_a_file_of_odometry() {
         (
             plane,
             "",
-            "[hinf]\ngamma = 0",
+            "[hinf]",
             "hinf",
             &["needs estimator = \"invariant-hinf\""],
         ),
@@ -394,7 +401,7 @@ fn each_fault_of_the_noise_of_odometry() {
 #[test]
 fn each_fault_of_a_mismatch() {
     let scale = "what = \"odometry_scale\"\n";
-    let cases: [(&str, &str, &str, &[&str]); 18] = [
+    let cases: [(&str, &str, &str, &[&str]); 17] = [
         (
             "soft",
             "sigma = 1",
@@ -481,12 +488,6 @@ fn each_fault_of_a_mismatch() {
         ),
         (
             "hard",
-            "what = \"odometry_rotation_bias\"\naxis = 3",
-            "mismatched[0].axis",
-            &["a name in quotes"],
-        ),
-        (
-            "hard",
             "what = \"odometry_scale\"\n[[mismatched]]\nwhat = \"odometry_scale\"",
             "mismatched[1].what",
             &["a table above declares"],
@@ -507,6 +508,12 @@ fn each_fault_of_a_mismatch() {
     for (mismatch, given, key, words) in cases {
         assert_single(&mismatched(mismatch, given), key, words);
     }
+    let in_space = "what = \"odometry_rotation_bias\"\naxis = \"w\"";
+    assert_single(
+        &mismatched("hard", in_space).replace("odometry2d", "odometry3d"),
+        "mismatched[0].axis",
+        &["\"x\", \"y\", \"z\""],
+    );
     for empty in ["", "mismatched = []"] {
         let top = format!("mismatch = \"adaptive\"\n{empty}");
         assert_single(

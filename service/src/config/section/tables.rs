@@ -130,6 +130,12 @@ impl<'a> Section<'_, 'a> {
         read_so_far
     }
 
+    /// Refuses the arrays of tables `names`, where they are given, without a look into them.
+    pub(in super::super) fn refuse_unread(&mut self, names: &[&'static str], reason: &str) {
+        self.known.extend_from_slice(names);
+        self.refuse_all(names, reason);
+    }
+
     /// Reads one table of an array.
     fn element<T>(
         &mut self,

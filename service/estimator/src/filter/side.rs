@@ -1,4 +1,5 @@
-//! Left or right invariance, as types.
+//! How a small error is attached to an estimate, as types: left or right invariance, and the parametrisations
+//! of the smoothers that \[IS\] and \[PAR\] compare.
 //!
 //! | | [`Left`] | [`Right`] |
 //! |---|---|---|
@@ -7,6 +8,8 @@
 //!
 //! The two are one filter with two costs (\[PAR\], Propositions 1 and 2): `xi_right =
 //! Ad_{chi_hat} xi_left`, and they agree as long as the covariance is carried along at updates.
+//! [`Gtsam`](super::Gtsam), [`Forster`](super::Forster) and [`Additive`](super::Additive) leave the rotation
+//! and the vectors uncoupled, and differ among themselves in the axes of the vectors alone.
 
 use core::fmt::Debug;
 
@@ -14,8 +17,12 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::lie::LieGroup;
 
-/// Which side of the estimate the error sits on.
+/// Which side of the estimate the error sits on, and in which coordinates.
 pub trait Side: Copy + Clone + Debug + PartialEq {
+    /// The same parametrisation in body coordinates, where a change of coordinates is all that tells them apart:
+    /// `retract(chi, A xi) = Body::retract(chi, xi)` with `A = from_left(chi)`, for xi of any size.
+    type Body: Side;
+
     /// The group element that lies `xi` away from `chi`.
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G;
 
@@ -26,14 +33,14 @@ pub trait Side: Copy + Clone + Debug + PartialEq {
     /// an error written around `chi` to the point `xi` away from it.
     fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D>;
 
-    /// A, with `xi_side = A xi_left` at `chi`.
+    /// A, with `xi_side = A xi_left` at `chi`, to first order.
     fn from_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D>;
 
-    /// `A^-1`, with `xi_left = A^-1 xi_side` at `chi`.
+    /// `A^-1`, with `xi_left = A^-1 xi_side` at `chi`, to first order.
     fn to_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D>;
 
-    /// Whether the error is the left-invariant one already, so that changes of coordinates can
-    /// be left out.
+    /// Whether the error is the left-invariant one already, to first order, so that changes of
+    /// coordinates can be left out.
     const IS_LEFT: bool;
 }
 
@@ -46,6 +53,8 @@ pub struct Left;
 pub struct Right;
 
 impl Side for Left {
+    type Body = Self;
+
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
         chi.compose(&G::exp(xi))
     }
@@ -70,6 +79,8 @@ impl Side for Left {
 }
 
 impl Side for Right {
+    type Body = Left;
+
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
         G::exp(xi).compose(chi)
     }

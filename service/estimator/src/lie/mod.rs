@@ -41,6 +41,10 @@ pub trait LieGroup<const D: usize>: Copy + Clone + Debug + PartialEq {
     /// How many of the leading tangent coordinates are the rotation: 1 in the plane, 3 in space.
     const ROTATION_DIM: usize;
 
+    /// How many of the tangent coordinates that follow the rotation are a velocity: 3 in the groups of inertial
+    /// navigation, 0 in those of poses.
+    const VELOCITY_DIM: usize = 0;
+
     /// The neutral element: `X identity = identity X = X`.
     fn identity() -> Self;
 

@@ -23,6 +23,7 @@ pub struct SE23 {
 
 impl LieGroup<9> for SE23 {
     const ROTATION_DIM: usize = 3;
+    const VELOCITY_DIM: usize = 3;
 
     fn identity() -> Self {
         Self {

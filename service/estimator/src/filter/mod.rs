@@ -3,8 +3,9 @@
 //! [`Belief`] is a concentrated Gaussian in the left- or right-invariant error ([`side`]), in the
 //! additive one of the EKF ([`additive`]), or in those of the usual smoothers ([`componentwise`]);
 //! [`mod@propagate`] moves it with the IMU or with odometry, [`mod@update`] corrects it with an observation: one
-//! core for every sensor, group, side and filter. What tells the filters apart is the side and the rule of the gain ([`gain`]): Kalman's, the linearly
-//! constrained one ([`constrained`], on the algebra of [`constraint`]), H-infinity ([`hinf`]), Schmidt's.
+//! core for every sensor, group, side and filter. What tells the filters apart is the side and the rule of the
+//! gain ([`gain`]): Kalman's, the linearly constrained one ([`constrained`], on the algebra of [`constraint`]),
+//! H-infinity ([`hinf`]), Schmidt's.
 //! [`adaptive`] runs several filters at once where the behaviour of a mismatch is itself unknown,
 //! [`gate`] judges innovations, [`alignment`] makes the first belief.
 //!

@@ -1,5 +1,18 @@
 //! Smoothing: the most likely trajectory given all measurements, \[IS\] (12).
+//!
+//! [`chain`] says what is known: a prior, motions, observations. [`batch`] finds the trajectory by Gauss-Newton, with
+//! any parametrisation of [`filter::side`](crate::filter::side); [`mod@linearise`] makes each of its steps a linear
+//! problem, [`solver`] solves that in linear time, exactly where noise vanishes and where the prior is singular.
+//! [`mod@deviation`] measures residuals under such covariances.
 
+pub mod batch;
+pub mod chain;
+pub mod deviation;
+pub mod linearise;
 pub mod solver;
 
+pub use batch::{Batch, BatchOptions, Cost, Smoothed, Step};
+pub use chain::{Chain, Link, Motion, Sighting};
+pub use deviation::{Deviation, deviation};
+pub use linearise::Jacobians;
 pub use solver::{Gain, Gaussian, LinearMeasurement, LinearMotion, SmootherError, Solver};

@@ -9,10 +9,14 @@ pub mod batch;
 pub mod chain;
 pub mod deviation;
 pub mod linearise;
+pub mod preintegration;
 pub mod solver;
+pub mod window;
 
 pub use batch::{Batch, BatchOptions, Cost, Smoothed, Step};
 pub use chain::{Chain, Link, Motion, Sighting};
 pub use deviation::{Deviation, deviation};
 pub use linearise::Jacobians;
+pub use preintegration::Preintegration;
 pub use solver::{Gain, Gaussian, LinearMeasurement, LinearMotion, SmootherError, Solver};
+pub use window::{Fix, PriorForm, Window, WindowCorrection, WindowError, WindowOptions};

@@ -22,6 +22,7 @@ use crate::model::{
     Automorphism, Discretisation, FreeMotion, GroupAffineStep, ImuInput, ImuNoise, ImuStep,
     InertialState,
 };
+use crate::smoother::Motion;
 
 /// The motion of a body over any number of IMU intervals.
 #[derive(Clone, Copy, Debug)]
@@ -82,9 +83,7 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
         discretisation: Discretisation,
         noise: &ImuNoise,
     ) {
-        let step = self
-            .reference
-            .imu_step(measured, g_w, dt_s, discretisation);
+        let step = self.reference.imu_step(measured, g_w, dt_s, discretisation);
         let (_, f, q) = self.reference.advance(&step, noise);
         self.noise = self.noise.transformed(&f).plus(&q);
         self.motion = composed(&self.motion, &step);
@@ -111,8 +110,13 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
     /// Exact without biases. With them, of first order in what the biases of `chi` differ from the reference;
     /// F is the exact derivative of that.
     pub fn transition(&self, chi: &G) -> (G, SMatrix<f64, D, D>) {
+        chi.transition(&self.motion_of(chi))
+    }
+
+    /// The motion at the biases of `chi`.
+    fn motion_of(&self, chi: &G) -> ImuStep {
         if G::IS_GROUP_AFFINE {
-            return chi.transition(&self.motion);
+            return self.motion;
         }
         let gyro = chi.gyro_bias() - self.reference.gyro_bias();
         let accel = chi.accel_bias() - self.reference.accel_bias();
@@ -121,7 +125,7 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
         let mut corrected = self.motion;
         corrected.step.body = corrected.step.body.compose(&SE23::exp(&xi));
         corrected.input_jacobian = SE23::right_jacobian(&xi) * corrected.input_jacobian;
-        chi.transition(&corrected)
+        corrected
     }
 
     /// `belief` after the motion: `chi = f(chi_hat)`, `P+ = F P F^T + Q`.
@@ -129,5 +133,16 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
         let (mean, f) = self.transition(&belief.mean);
         let covariance = belief.covariance.transformed(&f).plus(self.noise.matrix());
         Belief::new(mean, covariance)
+    }
+}
+
+impl<G: InertialState<D>, const D: usize> Motion<G, D> for Preintegration<G, D> {
+    fn apply(&self, chi: &G) -> G {
+        let pose = self.motion_of(chi).step.apply(chi.pose());
+        G::from_parts(pose.normalized(), chi.gyro_bias(), chi.accel_bias())
+    }
+
+    fn left_jacobian(&self, chi: &G) -> SMatrix<f64, D, D> {
+        self.transition(chi).1
     }
 }

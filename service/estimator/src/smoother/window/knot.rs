@@ -1,0 +1,155 @@
+//! One state of the window, with the motion that led to it, what saw it, and its gains.
+//!
+//! All in left-invariant coordinates at the estimate of the last solve.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::Fix;
+use crate::filter::{Covariance, Side};
+use crate::model::InertialState;
+use crate::smoother::linearise;
+use crate::smoother::{Gain, Jacobians, Link, Motion, Preintegration};
+
+/// What the passes need of a fix beyond the fix.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FixGain<const D: usize> {
+    /// K, D x 3.
+    pub gain: SMatrix<f64, D, 3>,
+    /// Inverse of the innovation covariance.
+    pub weight: Matrix3<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Knot<G, const D: usize> {
+    /// The estimate.
+    pub chi: G,
+    /// The estimate before the update that is under way.
+    pub before: G,
+    /// The motion from the state before; without meaning for the oldest state.
+    pub motion: Preintegration<G, D>,
+    pub fix: Option<Fix>,
+
+    /// F of the motion.
+    pub transition: SMatrix<f64, D, D>,
+    /// Covariance given all that was before this state.
+    pub predicted: Covariance<D>,
+    /// The same, and what saw this state.
+    pub filtered: Covariance<D>,
+    /// Present if there is a fix and its gain has been computed.
+    pub gain: Option<FixGain<D>>,
+
+    /// On the way forward the filtered correction, on the way back the smoothed one.
+    pub correction: SVector<f64, D>,
+    /// Innovation, and the same times the inverse of its covariance.
+    pub innovation: Vector3<f64>,
+    pub weighted: Vector3<f64>,
+}
+
+impl<G: InertialState<D>, const D: usize> Knot<G, D> {
+    /// A state that nothing has seen yet.
+    pub fn new(
+        chi: G,
+        motion: &Preintegration<G, D>,
+        transition: SMatrix<f64, D, D>,
+        predicted: Covariance<D>,
+    ) -> Self {
+        Self {
+            chi,
+            before: chi,
+            motion: *motion,
+            fix: None,
+            transition,
+            predicted,
+            filtered: predicted,
+            gain: None,
+            correction: SVector::zeros(),
+            innovation: Vector3::zeros(),
+            weighted: Vector3::zeros(),
+        }
+    }
+
+    /// Takes the fix back.
+    pub fn unsee(&mut self) {
+        self.fix = None;
+        self.gain = None;
+        self.filtered = self.predicted;
+    }
+
+    /// The offset of the motion from `before`, `xi = F xi_before + offset + w`, if the Jacobians are frozen: minus
+    /// `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
+    pub fn offset<S: Side>(&self, before: &G) -> SVector<f64, D> {
+        -S::Body::difference(&self.motion.apply(before), &self.chi)
+    }
+
+    /// The motion from `before` linearised anew: keeps F, and the covariance after it from the `filtered` one before
+    /// it. Gives the offset.
+    pub fn link<S: Side>(
+        &mut self,
+        before: &G,
+        filtered: &Covariance<D>,
+        jacobians: Jacobians,
+    ) -> SVector<f64, D> {
+        let link = Link {
+            motion: self.motion,
+            noise: *self.motion.noise().matrix(),
+        };
+        let linear = linearise::motion::<G, S, _, D>(&link, before, &self.chi, jacobians);
+        self.transition = linear.transition;
+        self.predicted = filtered.transformed(&linear.transition).plus(&linear.noise);
+        linear.offset
+    }
+
+    /// The gain, and the covariance after the fix. `false` if the innovation covariance is not positive
+    /// definite.
+    pub fn weigh(&mut self) -> bool {
+        let Some(fix) = &self.fix else {
+            self.gain = None;
+            self.filtered = self.predicted;
+            return true;
+        };
+        let noise = fix.covariance_b(&self.chi);
+        let Some((gain, filtered)) = Gain::new(&self.predicted, &fix.jacobian(), &noise) else {
+            return false;
+        };
+        self.gain = Some(FixGain {
+            gain: gain.gain,
+            weight: gain.innovation.inverse(),
+        });
+        self.filtered = filtered;
+        true
+    }
+
+    /// The filtered correction from the `predicted` one.
+    pub fn correct(&mut self, predicted: SVector<f64, D>) {
+        self.correction = predicted;
+        if let (Some(fix), Some(gain)) = (&self.fix, &self.gain) {
+            self.innovation = fix.residual_b(&self.chi) - fix.seen(&predicted);
+            self.weighted = gain.weight * self.innovation;
+            self.correction += gain.gain * self.innovation;
+        }
+    }
+
+    /// The smoothed correction, from the adjoint at the end of this state; gives the adjoint at its beginning.
+    pub fn smooth(&mut self, adjoint: SVector<f64, D>) -> SVector<f64, D> {
+        self.correction += self.filtered.matrix() * adjoint;
+        match (&self.fix, &self.gain) {
+            (Some(fix), Some(gain)) => {
+                let weight = self.weighted - gain.gain.tr_mul(&adjoint);
+                fix.add_transposed(adjoint, &weight)
+            }
+            _ => adjoint,
+        }
+    }
+
+    /// The information matrix at the beginning of this state, from that at its end.
+    pub fn information(&self, end: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+        match (&self.fix, &self.gain) {
+            (Some(fix), Some(gain)) => {
+                let h = fix.jacobian::<D>();
+                let rest = SMatrix::identity() - gain.gain * h;
+                rest.transpose() * end * rest + h.transpose() * gain.weight * h
+            }
+            _ => *end,
+        }
+    }
+}

@@ -30,8 +30,9 @@ use crate::smoother::{Gaussian, Jacobians, Preintegration};
 mod fix;
 mod knot;
 mod prior;
+mod track;
 
-use knot::Knot;
+use knot::{Knot, Passage};
 use prior::Prior;
 
 pub use fix::Fix;
@@ -114,6 +115,8 @@ pub struct Window<G, S, const D: usize> {
     prior: Prior<G, D>,
     /// Oldest first; never empty.
     knots: VecDeque<Knot<G, D>>,
+    /// Of the same states.
+    passages: VecDeque<Passage<G, D>>,
     /// How many fixes in the window have noise that differs by direction.
     anisotropic: usize,
     /// Whether the gains that are stored are those of terms which do not depend on the estimate.
@@ -133,6 +136,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             options,
             prior: Self::first_prior(first, &options),
             knots: VecDeque::with_capacity(options.capacity),
+            passages: VecDeque::with_capacity(options.capacity),
             anisotropic: 0,
             gains_hold: false,
             side: PhantomData,
@@ -145,12 +149,14 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     pub fn restart(&mut self, first: &Belief<G, Left, D>) {
         self.prior = Self::first_prior(first, &self.options);
         self.knots.clear();
-        self.knots.push_back(Knot::new(
-            first.mean,
-            &Preintegration::new(&first.mean),
-            SMatrix::identity(),
-            first.covariance,
-        ));
+        self.passages.clear();
+        let passage = Passage {
+            motion: Preintegration::new(&first.mean),
+            transition: SMatrix::identity(),
+            predicted: first.covariance,
+        };
+        self.knots.push_back(Knot::new(first.mean, &passage));
+        self.passages.push_back(passage);
         self.anisotropic = 0;
         self.gains_hold = self.is_constant();
     }
@@ -168,45 +174,49 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     pub fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
         let newest = self.newest_knot();
         let (chi, transition) = motion.transition(&newest.chi);
-        let predicted = newest
-            .filtered
-            .transformed(&transition)
-            .plus(motion.noise().matrix());
-        let knot = Knot::new(chi, motion, transition, predicted);
-        let leaves = self.knots.len() >= self.options.capacity;
-        let left = leaves.then(|| self.marginalise(&knot));
+        let mut passage = Passage {
+            motion: *motion,
+            transition,
+            predicted: newest.filtered,
+        };
+        passage.pass(&newest.filtered);
+        let knot = Knot::new(chi, &passage);
+        let left = self.is_full().then(|| self.marginalise(&knot, &passage));
         self.knots.push_back(knot);
+        self.passages.push_back(passage);
         left
     }
 
-    /// Removes the oldest state; what is known from it becomes the prior of the next, which is `next` if the window
-    /// is empty then. Gives its estimate.
-    fn marginalise(&mut self, next: &Knot<G, D>) -> G {
+    /// Removes the oldest state; what is known from it becomes the prior of the next one, which is the given one if
+    /// the window is empty then. Gives its estimate.
+    fn marginalise(&mut self, knot: &Knot<G, D>, passage: &Passage<G, D>) -> G {
         let fresh = self.must_linearise();
         let first = &mut self.knots[0];
         if fresh {
             let prior = self.prior.at::<S>(&first.chi);
-            first.predicted = prior.covariance;
-            // A fix that is in the window had a positive definite innovation covariance when it came.
-            first.weigh();
+            // It was positive definite at the last update, if there is a fix.
+            first.weigh(&prior.covariance);
             first.correct(prior.mean);
         } else {
             let wanted = self.prior.mean_at::<S>(&first.chi);
             first.correct(wanted);
         }
         let left = *first;
-        self.anisotropic -= usize::from(left.fix.is_some_and(|s| !s.is_isotropic()));
+        self.anisotropic -= usize::from(left.fix.is_some_and(|fix| !fix.is_isotropic()));
         self.knots.pop_front();
+        self.passages.pop_front();
 
-        let mut next = *self.knots.front().unwrap_or(next);
+        let next = self.knots.front().unwrap_or(knot);
+        let mut passage = *self.passages.front().unwrap_or(passage);
         let offset = if fresh {
-            next.link::<S>(&left.chi, &left.filtered, self.options.jacobians)
+            let jacobians = self.options.jacobians;
+            passage.link::<S>(&left.chi, &next.chi, &left.filtered, jacobians)
         } else {
             next.offset::<S>(&left.chi)
         };
         let correction = Gaussian {
-            mean: next.transition * left.correction + offset,
-            covariance: next.predicted,
+            mean: passage.transition * left.correction + offset,
+            covariance: passage.predicted,
         };
         self.prior = Prior::new::<S>(self.options.prior, &next.chi, &correction);
         left.chi
@@ -224,78 +234,88 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         }
         self.knots[last].fix = Some(fix);
         self.anisotropic += usize::from(!fix.is_isotropic());
-        for knot in &mut self.knots {
-            knot.before = knot.chi;
-        }
-        let outcome = self.iterate();
-        if !matches!(outcome, Ok(WindowCorrection { verdict, .. }) if verdict == Verdict::Accepted)
-        {
+        let mut steps = 0;
+        let outcome = self.iterate(&mut steps);
+        if !matches!(outcome, Ok(correction) if correction.verdict == Verdict::Accepted) {
             self.anisotropic -= usize::from(!fix.is_isotropic());
-            for knot in &mut self.knots {
-                knot.chi = knot.before;
+            self.knots[last].unsee(&self.passages[last]);
+            if steps > 0 {
+                for knot in &mut self.knots {
+                    knot.chi = knot.before;
+                }
             }
-            self.knots[last].unsee();
         }
         outcome
     }
 
-    fn iterate(&mut self) -> Result<WindowCorrection, WindowError> {
-        let mut nis = f64::NAN;
-        for iteration in 0..self.options.iterations {
+    /// Gauss-Newton; counts the steps that moved the states.
+    fn iterate(&mut self, steps: &mut usize) -> Result<WindowCorrection, WindowError> {
+        let mut correction = WindowCorrection {
+            verdict: Verdict::Accepted,
+            nis: f64::NAN,
+            iterations: self.options.iterations,
+        };
+        while *steps < self.options.iterations {
             self.forward()?;
-            if iteration == 0 {
+            if *steps == 0 {
                 let newest = self.newest_knot();
-                nis = newest.innovation.dot(&newest.weighted);
-                if !nis.is_finite() {
+                correction.nis = newest.innovation.dot(&newest.weighted);
+                if !correction.nis.is_finite() {
                     return Err(WindowError::NotFinite);
                 }
-                if nis > self.options.gate {
-                    return Ok(WindowCorrection {
-                        verdict: Verdict::Gated,
-                        nis,
-                        iterations: 0,
-                    });
+                if correction.nis > self.options.gate {
+                    correction.verdict = Verdict::Gated;
+                    correction.iterations = 0;
+                    return Ok(correction);
+                }
+                for knot in &mut self.knots {
+                    knot.before = knot.chi;
                 }
             }
+            *steps += 1;
             self.backward()?;
         }
-        Ok(WindowCorrection {
-            verdict: Verdict::Accepted,
-            nis,
-            iterations: self.options.iterations,
-        })
+        Ok(correction)
     }
 
     /// The Kalman filter over the linearised window.
     fn forward(&mut self) -> Result<(), WindowError> {
         let fresh = self.must_linearise();
-        let jacobians = self.options.jacobians;
         let constant = self.is_constant();
+        let affine = self.is_affine();
+        let jacobians = self.options.jacobians;
         let last = self.knots.len() - 1;
-        let mut before: Option<Knot<G, D>> = None;
-        for (index, knot) in self.knots.iter_mut().enumerate() {
+        let mut before: Option<(G, SVector<f64, D>)> = None;
+        let mut filtered = self.knots[0].filtered;
+        let states = self.knots.iter_mut().zip(&mut self.passages);
+        for (index, (knot, passage)) in states.enumerate() {
             let mean = match &before {
                 None if fresh => {
                     let prior = self.prior.at::<S>(&knot.chi);
-                    knot.predicted = prior.covariance;
+                    passage.predicted = prior.covariance;
                     prior.mean
                 }
                 None => self.prior.mean_at::<S>(&knot.chi),
-                Some(before) => {
-                    let offset = if fresh {
-                        knot.link::<S>(&before.chi, &before.filtered, jacobians)
-                    } else {
-                        knot.offset::<S>(&before.chi)
-                    };
-                    knot.transition * before.correction + offset
+                Some((chi, correction)) if affine => {
+                    if fresh {
+                        passage.pass(&filtered);
+                    }
+                    knot.carry(correction) + knot.offset::<S>(chi)
+                }
+                Some((chi, correction)) => {
+                    let offset = passage.link::<S>(chi, &knot.chi, &filtered, jacobians);
+                    passage.transition * correction + offset
                 }
             };
-            if (fresh || index == last) && !knot.weigh() {
-                self.gains_hold = false;
-                return Err(WindowError::InnovationNotPositiveDefinite);
+            if fresh || index == last {
+                if !knot.weigh(&passage.predicted) {
+                    self.gains_hold = false;
+                    return Err(WindowError::InnovationNotPositiveDefinite);
+                }
+                filtered = knot.filtered;
             }
             knot.correct(mean);
-            before = Some(*knot);
+            before = Some((knot.chi, knot.correction));
         }
         self.gains_hold = constant;
         Ok(())
@@ -303,20 +323,17 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// The disturbance smoother, and the step of all estimates.
     fn backward(&mut self) -> Result<(), WindowError> {
+        let affine = self.is_affine();
         let mut adjoint = SVector::<f64, D>::zeros();
-        let mut finite = true;
-        for knot in self.knots.iter_mut().rev() {
+        let mut sum = 0.0;
+        for (knot, passage) in self.knots.iter_mut().zip(&self.passages).rev() {
             let start = knot.smooth(adjoint);
-            finite &= knot
-                .correction
-                .iter()
-                .all(|component| component.is_finite());
-            adjoint = knot.transition.tr_mul(&start);
-        }
-        if !finite {
-            return Err(WindowError::NotFinite);
-        }
-        for knot in &mut self.knots {
+            sum += knot.correction.sum();
+            adjoint = if affine {
+                knot.carry_back(&start)
+            } else {
+                passage.transition.tr_mul(&start)
+            };
             let xi = if S::IS_LEFT {
                 knot.correction
             } else {
@@ -324,15 +341,21 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             };
             knot.chi = S::retract(&knot.chi, &xi);
         }
-        Ok(())
+        if sum.is_finite() {
+            Ok(())
+        } else {
+            Err(WindowError::NotFinite)
+        }
+    }
+
+    /// Whether the linearised motions are the same at all estimates, but for their offsets.
+    fn is_affine(&self) -> bool {
+        G::IS_GROUP_AFFINE && S::Residual::IS_LEFT && self.options.jacobians == Jacobians::Frozen
     }
 
     /// Whether nothing that enters the covariances depends on the estimates.
     fn is_constant(&self) -> bool {
-        G::IS_GROUP_AFFINE
-            && self.anisotropic == 0
-            && self.options.jacobians == Jacobians::Frozen
-            && self.prior.is_constant::<S>()
+        self.is_affine() && self.anisotropic == 0 && self.prior.is_constant::<S>()
     }
 
     fn must_linearise(&self) -> bool {
@@ -375,9 +398,10 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     pub fn smoothed(&self, index: usize) -> Option<Belief<G, Left, D>> {
         let knot = self.knots.get(index)?;
         let mut information = SMatrix::<f64, D, D>::zeros();
-        for later in self.knots.range(index + 1..).rev() {
+        let later = self.knots.range(index + 1..);
+        for (later, passage) in later.zip(self.passages.range(index + 1..)).rev() {
             let start = later.information(&information);
-            information = later.transition.tr_mul(&start) * later.transition;
+            information = passage.transition.tr_mul(&start) * passage.transition;
         }
         let p = knot.filtered.matrix();
         let covariance = Covariance::from_upper(p - p * information * p);

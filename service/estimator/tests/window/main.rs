@@ -10,3 +10,5 @@ mod common;
 
 mod align_straight;
 mod golden;
+mod recording;
+mod timing;

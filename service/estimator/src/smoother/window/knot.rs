@@ -5,10 +5,11 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::Fix;
+use super::track::Track;
 use crate::filter::{Covariance, Side};
 use crate::model::InertialState;
 use crate::smoother::linearise;
-use crate::smoother::{Gain, Jacobians, Link, Motion, Preintegration};
+use crate::smoother::{Gain, Jacobians, Link, Preintegration};
 
 /// What the passes need of a fix beyond the fix.
 #[derive(Clone, Copy, Debug)]
@@ -19,24 +20,59 @@ pub(super) struct FixGain<const D: usize> {
     pub weight: Matrix3<f64>,
 }
 
+/// How a state was reached: what is read only where gains are computed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Passage<G, const D: usize> {
+    /// The motion from the state before; without meaning for the oldest state.
+    pub motion: Preintegration<G, D>,
+    /// F of the motion.
+    pub transition: SMatrix<f64, D, D>,
+    /// Covariance given all that was before this state.
+    pub predicted: Covariance<D>,
+}
+
+impl<G: InertialState<D>, const D: usize> Passage<G, D> {
+    /// The motion from `before` to `chi` linearised anew: keeps F, and the covariance after it from the `filtered`
+    /// one before it. Gives the offset.
+    pub fn link<S: Side>(
+        &mut self,
+        before: &G,
+        chi: &G,
+        filtered: &Covariance<D>,
+        jacobians: Jacobians,
+    ) -> SVector<f64, D> {
+        let link = Link {
+            motion: self.motion,
+            noise: *self.motion.noise().matrix(),
+        };
+        let linear = linearise::motion::<G, S, _, D>(&link, before, chi, jacobians);
+        self.transition = linear.transition;
+        self.predicted = filtered.transformed(&linear.transition).plus(&linear.noise);
+        linear.offset
+    }
+
+    /// The same for a motion whose F does not depend on the states: only the covariance.
+    pub fn pass(&mut self, filtered: &Covariance<D>) {
+        self.predicted = filtered
+            .transformed(&self.transition)
+            .plus(self.motion.noise().matrix());
+    }
+}
+
+/// A state, with what every pass over the window reads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Knot<G, const D: usize> {
     /// The estimate.
     pub chi: G,
     /// The estimate before the update that is under way.
     pub before: G,
-    /// The motion from the state before; without meaning for the oldest state.
-    pub motion: Preintegration<G, D>,
+    /// The motion from the state before, if it is group-affine.
+    track: Track,
     pub fix: Option<Fix>,
-
-    /// F of the motion.
-    pub transition: SMatrix<f64, D, D>,
-    /// Covariance given all that was before this state.
-    pub predicted: Covariance<D>,
-    /// The same, and what saw this state.
-    pub filtered: Covariance<D>,
     /// Present if there is a fix and its gain has been computed.
-    pub gain: Option<FixGain<D>>,
+    gain: Option<FixGain<D>>,
+    /// Covariance given all up to this state.
+    pub filtered: Covariance<D>,
 
     /// On the way forward the filtered correction, on the way back the smoothed one.
     pub correction: SVector<f64, D>,
@@ -47,20 +83,13 @@ pub(super) struct Knot<G, const D: usize> {
 
 impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     /// A state that nothing has seen yet.
-    pub fn new(
-        chi: G,
-        motion: &Preintegration<G, D>,
-        transition: SMatrix<f64, D, D>,
-        predicted: Covariance<D>,
-    ) -> Self {
+    pub fn new(chi: G, passage: &Passage<G, D>) -> Self {
         Self {
             chi,
             before: chi,
-            motion: *motion,
+            track: Track::new(&passage.motion.motion().step),
             fix: None,
-            transition,
-            predicted,
-            filtered: predicted,
+            filtered: passage.predicted,
             gain: None,
             correction: SVector::zeros(),
             innovation: Vector3::zeros(),
@@ -69,46 +98,40 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     }
 
     /// Takes the fix back.
-    pub fn unsee(&mut self) {
+    pub fn unsee(&mut self, passage: &Passage<G, D>) {
         self.fix = None;
         self.gain = None;
-        self.filtered = self.predicted;
+        self.filtered = passage.predicted;
     }
 
-    /// The offset of the motion from `before`, `xi = F xi_before + offset + w`, if the Jacobians are frozen: minus
-    /// `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
+    /// The offset of a group-affine motion from `before`, `xi = F xi_before + offset + w`, with frozen Jacobians:
+    /// minus `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
     pub fn offset<S: Side>(&self, before: &G) -> SVector<f64, D> {
-        -S::Body::difference(&self.motion.apply(before), &self.chi)
+        let expected = self.track.apply(before.pose());
+        let expected = G::from_parts(expected, before.gyro_bias(), before.accel_bias());
+        -S::Residual::difference(&expected, &self.chi)
     }
 
-    /// The motion from `before` linearised anew: keeps F, and the covariance after it from the `filtered` one before
-    /// it. Gives the offset.
-    pub fn link<S: Side>(
-        &mut self,
-        before: &G,
-        filtered: &Covariance<D>,
-        jacobians: Jacobians,
-    ) -> SVector<f64, D> {
-        let link = Link {
-            motion: self.motion,
-            noise: *self.motion.noise().matrix(),
-        };
-        let linear = linearise::motion::<G, S, _, D>(&link, before, &self.chi, jacobians);
-        self.transition = linear.transition;
-        self.predicted = filtered.transformed(&linear.transition).plus(&linear.noise);
-        linear.offset
+    /// `F xi` of a group-affine motion with frozen Jacobians.
+    pub fn carry(&self, xi: &SVector<f64, D>) -> SVector<f64, D> {
+        self.track.carry(xi)
+    }
+
+    /// `F^T xi` of the same.
+    pub fn carry_back(&self, xi: &SVector<f64, D>) -> SVector<f64, D> {
+        self.track.carry_back(xi)
     }
 
     /// The gain, and the covariance after the fix. `false` if the innovation covariance is not positive
     /// definite.
-    pub fn weigh(&mut self) -> bool {
+    pub fn weigh(&mut self, predicted: &Covariance<D>) -> bool {
         let Some(fix) = &self.fix else {
             self.gain = None;
-            self.filtered = self.predicted;
+            self.filtered = *predicted;
             return true;
         };
         let noise = fix.covariance_b(&self.chi);
-        let Some((gain, filtered)) = Gain::new(&self.predicted, &fix.jacobian(), &noise) else {
+        let Some((gain, filtered)) = Gain::new(predicted, &fix.jacobian(), &noise) else {
             return false;
         };
         self.gain = Some(FixGain {

@@ -18,7 +18,7 @@ use crate::lie::LieGroup;
 pub struct Additive;
 
 impl Side for Additive {
-    type Body = Gtsam;
+    type Residual = Self;
 
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
         Gtsam::retract(chi, &(Self::to_left(chi) * xi))
@@ -30,6 +30,10 @@ impl Side for Additive {
 
     fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
         with_rotation_of::<G, D>(&G::left_jacobian(xi), SMatrix::identity())
+    }
+
+    fn origin_jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        with_rotation_of::<G, D>(&G::exp(xi).adjoint(), SMatrix::identity())
     }
 
     fn from_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D> {

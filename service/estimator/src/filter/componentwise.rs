@@ -75,7 +75,7 @@ fn with_vectors_times<G: LieGroup<D>, const D: usize>(
 }
 
 impl Side for Gtsam {
-    type Body = Self;
+    type Residual = Self;
 
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
         let inverse = G::left_jacobian_inverse(xi);
@@ -93,6 +93,10 @@ impl Side for Gtsam {
         with_rotation_of::<G, D>(&G::right_jacobian(xi), turned_back)
     }
 
+    fn origin_jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        Self::retract(&G::identity(), xi).inverse().adjoint()
+    }
+
     fn from_left<G: LieGroup<D>, const D: usize>(_chi: &G) -> SMatrix<f64, D, D> {
         SMatrix::identity()
     }
@@ -105,7 +109,7 @@ impl Side for Gtsam {
 }
 
 impl Side for Forster {
-    type Body = Gtsam;
+    type Residual = Gtsam;
 
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
         Gtsam::retract(chi, &(Self::to_left(chi) * xi))
@@ -121,6 +125,15 @@ impl Side for Forster {
         for column in G::ROTATION_DIM..G::ROTATION_DIM + G::VELOCITY_DIM {
             jacobian.column_mut(column).fill(0.0);
             jacobian[(column, column)] = 1.0;
+        }
+        jacobian
+    }
+
+    fn origin_jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        let mut jacobian = Gtsam::origin_jacobian::<G, D>(xi);
+        for row in G::ROTATION_DIM..G::ROTATION_DIM + G::VELOCITY_DIM {
+            jacobian.row_mut(row).fill(0.0);
+            jacobian[(row, row)] = 1.0;
         }
         jacobian
     }

@@ -19,9 +19,11 @@ use crate::lie::LieGroup;
 
 /// Which side of the estimate the error sits on, and in which coordinates.
 pub trait Side: Copy + Clone + Debug + PartialEq {
-    /// The same parametrisation in body coordinates, where a change of coordinates is all that tells them apart:
-    /// `retract(chi, A xi) = Body::retract(chi, xi)` with `A = from_left(chi)`, for xi of any size.
-    type Body: Side;
+    /// The chart in which a smoother with this parametrisation writes the residual of a motion, so that what is
+    /// compared is what its users compare: the group's logarithm in body axes for both exponentials, uncoupled
+    /// in body axes for [`Gtsam`](super::Gtsam) and [`Forster`](super::Forster), and in world axes for
+    /// [`Additive`](super::Additive).
+    type Residual: Side;
 
     /// The group element that lies `xi` away from `chi`.
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G;
@@ -32,6 +34,10 @@ pub trait Side: Copy + Clone + Debug + PartialEq {
     /// J with `retract(chi, xi + d) = retract(retract(chi, xi), J d)` to first order: it carries
     /// an error written around `chi` to the point `xi` away from it.
     fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D>;
+
+    /// K with `difference(retract(chi, e), retract(chi, xi)) = xi - J^-1 K e` to first order in e, J the
+    /// [`jacobian`](Self::jacobian): how a difference follows the point that it is taken from.
+    fn origin_jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D>;
 
     /// A, with `xi_side = A xi_left` at `chi`, to first order.
     fn from_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D>;
@@ -53,7 +59,7 @@ pub struct Left;
 pub struct Right;
 
 impl Side for Left {
-    type Body = Self;
+    type Residual = Self;
 
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
         chi.compose(&G::exp(xi))
@@ -65,6 +71,10 @@ impl Side for Left {
 
     fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
         G::right_jacobian(xi)
+    }
+
+    fn origin_jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        G::exp(&-xi).adjoint()
     }
 
     fn from_left<G: LieGroup<D>, const D: usize>(_chi: &G) -> SMatrix<f64, D, D> {
@@ -79,7 +89,7 @@ impl Side for Left {
 }
 
 impl Side for Right {
-    type Body = Left;
+    type Residual = Left;
 
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
         G::exp(xi).compose(chi)
@@ -91,6 +101,10 @@ impl Side for Right {
 
     fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
         G::left_jacobian(xi)
+    }
+
+    fn origin_jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {
+        G::exp(xi).adjoint()
     }
 
     fn from_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D> {

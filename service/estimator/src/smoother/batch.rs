@@ -4,8 +4,9 @@
 //! by its retraction. The parametrisation is the type S: [`Left`](crate::filter::Left) is invariant smoothing,
 //! [`Right`](crate::filter::Right) the same with errors in the world,
 //! [`Gtsam`](crate::filter::Gtsam) and [`Forster`](crate::filter::Forster) are \[IS\] (23) and (22),
-//! [`Additive`](crate::filter::Additive) the conventional smoother. Parametrisations of one body chart make the
-//! same trajectory at every iteration (\[PAR\], Proposition 3): Left and Right, and the three others.
+//! [`Additive`](crate::filter::Additive) the conventional smoother. Where residuals and retractions are the same but
+//! for a change of coordinates, so is the trajectory of every iteration (\[PAR\], Proposition 3): of Left and Right,
+//! and of Gtsam and Forster.
 //!
 //! With group-affine motions without noise, invariant smoothing keeps `chi_{i+1} = f_i(chi_i)` at every iteration,
 //! and stays in what the prior can reach (\[IS\], Theorem 1); the others do not.
@@ -36,10 +37,10 @@ pub struct BatchOptions {
 }
 
 impl Default for BatchOptions {
-    /// At most 20 exact steps, down to 1e-9, none of which raises the cost.
+    /// At most 50 exact steps, down to 1e-9, none of which raises the cost.
     fn default() -> Self {
         Self {
-            iterations: 20,
+            iterations: 50,
             tolerance: 1e-9,
             jacobians: Jacobians::Exact,
             step_control: true,
@@ -204,7 +205,7 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
                 self.states
                     .iter()
                     .zip(steps)
-                    .map(|(chi, xi)| S::Body::retract(chi, &(xi * share))),
+                    .map(|(chi, xi)| moved::<G, S, D>(chi, &(xi * share))),
             );
             let accepted = match ceiling {
                 Some(ceiling) => cost::<G, S, P, T, O, D, M>(chain, &self.trial)?.square <= ceiling,
@@ -282,7 +283,16 @@ fn check_length<G, P, T, O, const D: usize>(
     })
 }
 
-/// The cost of `states`, with the residuals of the links in the body chart of S.
+/// `chi` after the left-invariant step `xi`, by the retraction of S.
+fn moved<G: LieGroup<D>, S: Side, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
+    if S::IS_LEFT {
+        S::retract(chi, xi)
+    } else {
+        S::retract(chi, &(S::from_left(chi) * xi))
+    }
+}
+
+/// The cost of `states`, with the residuals of the links in the chart of S.
 fn cost<G, S, P, T, O, const D: usize, const M: usize>(
     chain: &Chain<G, P, T, O, D>,
     states: &[G],
@@ -307,7 +317,7 @@ where
     let residual = P::difference(&prior.mean, &states[0]);
     add(deviation(&residual, prior.covariance.matrix()));
     for (link, pair) in chain.links().iter().zip(states.windows(2)) {
-        let residual = S::Body::difference(&link.motion.apply(&pair[0]), &pair[1]);
+        let residual = linearise::departure::<G, S, T, D>(&link.motion, &pair[0], &pair[1]);
         add(deviation(&residual, &link.noise));
     }
     for sighting in chain.sightings() {

@@ -4,18 +4,18 @@
 //! parametrisation: one parametrisation's unknowns are another's times a matrix, and so is the step
 //! (\[PAR\], Proposition 3). What differs is the chart in which a residual is written, and the retraction.
 //!
-//! With B a parametrisation in body coordinates, J its Jacobian, and `r = difference(a, b)` the residual of a term:
-//!
 //! | term | residual | linear form |
 //! |---|---|---|
 //! | prior | `r = difference(chi_bar, chi_hat_0)` | `xi_0 ~ N(-J r, J P0 J^T)` |
-//! | link | `r = difference(f(chi_hat_i), chi_hat_{i+1})` | `xi_{i+1} = Ad_{m^-1} F xi_i - J r + w`, w of `J Q J^T`, `m = f(chi_hat_i)^-1 chi_hat_{i+1}` |
+//! | link | `r = difference(f(chi_hat_i), chi_hat_{i+1})` | `xi_{i+1} = K F xi_i - J r + w`, w of `J Q J^T` |
 //! | observation | `z = y - h(chi_hat)` | `z = H xi + v`, v of N |
 //!
-//! In the exponential chart `J = J_r(r)` and `J r = r`. \[IS\] leaves J out of the links, and the adjoint too:
-//! [`Jacobians::Frozen`]. \[IS\] (24) is the link with the adjoint.
+//! J says how the residual follows its end, K how it follows its start ([`Side::jacobian`],
+//! [`Side::origin_jacobian`]); for a chart that is not in body axes, both change coordinates too. In the
+//! exponential chart `J = J_r(r)`, `J r = r` and `K = Ad_exp(-r)`, which is \[IS\] (24). \[IS\] (14) leaves J and K
+//! out of the links: [`Jacobians::Frozen`].
 
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 use super::chain::{Link, Motion};
 use super::solver::{Gaussian, LinearMeasurement, LinearMotion};
@@ -28,7 +28,7 @@ use crate::model::Observation;
 pub enum Jacobians {
     /// The true ones: Gauss-Newton on the cost as it is.
     Exact,
-    /// Those at a residual of zero, as \[IS\] prints them for the links: `J = I`, `m = I`. Covariances then do not
+    /// Those at a residual of zero, `J = K = I` in body coordinates, as \[IS\] prints them for the links. Covariances then do not
     /// depend on the trajectory; the step differs from the exact one to second order in the residual.
     Frozen,
 }
@@ -60,7 +60,7 @@ pub fn prior<G: LieGroup<D>, P: Side, const D: usize>(
     }
 }
 
-/// The link from `from` to `to`, with its residual in the body chart of S.
+/// The link from `from` to `to`, with its residual in the chart of S.
 pub fn motion<G, S, T, const D: usize>(
     link: &Link<T, D>,
     from: &G,
@@ -72,26 +72,49 @@ where
     S: Side,
     T: Motion<G, D>,
 {
-    let expected = link.motion.apply(from);
     let transition = link.motion.left_jacobian(from);
-    let residual = S::Body::difference(&expected, to);
-    match jacobians {
-        Jacobians::Exact => {
-            let jacobian = S::Body::jacobian::<G, D>(&residual);
-            let back: SMatrix<f64, D, D> = to.inverse().compose(&expected).adjoint();
-            LinearMotion {
-                transition: back * transition,
-                offset: -(jacobian * residual),
-                noise: *Covariance::from_upper(link.noise)
-                    .transformed(&jacobian)
-                    .matrix(),
-            }
-        }
-        Jacobians::Frozen => LinearMotion {
+    if jacobians == Jacobians::Frozen {
+        return LinearMotion {
             transition,
-            offset: -residual,
+            offset: -departure::<G, S, T, D>(&link.motion, from, to),
             noise: link.noise,
-        },
+        };
+    }
+    let expected = link.motion.apply(from);
+    let residual = S::Residual::difference(&expected, to);
+    let mut to_end = S::Residual::jacobian::<G, D>(&residual);
+    let mut from_start = S::Residual::origin_jacobian::<G, D>(&residual);
+    let mut of_noise = to_end;
+    if !S::Residual::IS_LEFT {
+        let to_left = S::Residual::to_left(to);
+        let from_left: SMatrix<f64, D, D> = S::Residual::from_left(&expected);
+        to_end = to_left * to_end;
+        from_start = to_left * from_start * from_left;
+        of_noise = to_end * from_left;
+    }
+    LinearMotion {
+        transition: from_start * transition,
+        offset: -(to_end * residual),
+        noise: *Covariance::from_upper(link.noise)
+            .transformed(&of_noise)
+            .matrix(),
+    }
+}
+
+/// How far `to` is from where `motion` leads from `from`: the residual in the chart of S, in body coordinates, which
+/// are those of the noise.
+pub fn departure<G, S, T, const D: usize>(motion: &T, from: &G, to: &G) -> SVector<f64, D>
+where
+    G: LieGroup<D>,
+    S: Side,
+    T: Motion<G, D>,
+{
+    let expected = motion.apply(from);
+    let residual = S::Residual::difference(&expected, to);
+    if S::Residual::IS_LEFT {
+        residual
+    } else {
+        S::Residual::to_left(&expected) * residual
     }
 }
 

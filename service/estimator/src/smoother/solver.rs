@@ -118,7 +118,7 @@ impl<const D: usize, const M: usize> Gain<D, M> {
     ) -> Option<(Self, Covariance<D>)> {
         let p_ht = prior.times_transposed(jacobian);
         let innovation = Cholesky::new(jacobian * p_ht + noise)?;
-        let gain = p_ht * innovation.inverse();
+        let gain = innovation.solve(&p_ht.transpose()).transpose();
         let corrected = prior.corrected(&gain, jacobian, noise);
         let factored = Self {
             jacobian: *jacobian,

@@ -234,11 +234,13 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         }
         self.knots[last].fix = Some(fix);
         self.anisotropic += usize::from(!fix.is_isotropic());
+        let passage = self.passages[last];
         let mut steps = 0;
         let outcome = self.iterate(&mut steps);
         if !matches!(outcome, Ok(correction) if correction.verdict == Verdict::Accepted) {
             self.anisotropic -= usize::from(!fix.is_isotropic());
-            self.knots[last].unsee(&self.passages[last]);
+            self.passages[last] = passage;
+            self.knots[last].unsee(&passage);
             if steps > 0 {
                 for knot in &mut self.knots {
                     knot.chi = knot.before;

@@ -9,6 +9,11 @@
 mod common;
 
 mod align_straight;
+mod biased;
+mod drive;
+mod edges;
+mod gains;
 mod golden;
+mod preintegration;
 mod recording;
 mod timing;

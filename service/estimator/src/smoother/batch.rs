@@ -152,8 +152,10 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
         T: Motion<G, D>,
         O: Observation<G, D, M>,
     {
+        let mut cost = self.judged(chain, options)?;
         for iterations in 1..=options.iterations {
-            let step = self.iterate(chain, options)?;
+            let step;
+            (step, cost) = self.step_from(chain, options, cost)?;
             if step.largest <= options.tolerance {
                 return Ok(Smoothed {
                     iterations,
@@ -184,13 +186,42 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
         T: Motion<G, D>,
         O: Observation<G, D, M>,
     {
-        self.linearise(chain, options.jacobians)?;
-        let ceiling = if options.step_control {
-            let before = self.cost(chain)?;
-            (before.outside <= FEASIBLE).then_some(before.square * (1.0 + COST_ROUNDING))
+        let before = self.judged(chain, options)?;
+        Ok(self.step_from(chain, options, before)?.0)
+    }
+
+    /// The cost of the trajectory, where `options` ask for step control.
+    fn judged<P, T, O>(
+        &self,
+        chain: &Chain<G, P, T, O, D>,
+        options: &BatchOptions,
+    ) -> Result<Option<Cost>, SmootherError>
+    where
+        P: Side,
+        T: Motion<G, D>,
+        O: Observation<G, D, M>,
+    {
+        if options.step_control {
+            self.cost(chain).map(Some)
         } else {
-            None
-        };
+            Ok(None)
+        }
+    }
+
+    /// One iteration from a trajectory of the cost `before`; gives the cost after it too. Without a cost the step is
+    /// not judged.
+    fn step_from<P, T, O>(
+        &mut self,
+        chain: &Chain<G, P, T, O, D>,
+        options: &BatchOptions,
+        before: Option<Cost>,
+    ) -> Result<(Step, Option<Cost>), SmootherError>
+    where
+        P: Side,
+        T: Motion<G, D>,
+        O: Observation<G, D, M>,
+    {
+        self.linearise(chain, options.jacobians)?;
         let steps = self.solver.solve();
         if !steps.iter().all(|xi| xi.iter().all(|x| x.is_finite())) {
             return Err(SmootherError::NotFinite);
@@ -207,23 +238,25 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
                     .zip(steps)
                     .map(|(chi, xi)| moved::<G, S, D>(chi, &(xi * share))),
             );
-            let accepted = match ceiling {
-                Some(ceiling) => cost::<G, S, P, T, O, D, M>(chain, &self.trial)?.square <= ceiling,
-                None => true,
+            let after = match before {
+                Some(_) => Some(cost::<G, S, P, T, O, D, M>(chain, &self.trial)?),
+                None => None,
             };
-            if accepted {
+            if acceptable(before, after) {
                 core::mem::swap(&mut self.states, &mut self.trial);
-                return Ok(Step {
+                let step = Step {
                     largest: share * largest,
                     share,
-                });
+                };
+                return Ok((step, after));
             }
             share *= 0.5;
         }
-        Ok(Step {
+        let none = Step {
             largest: 0.0,
             share: 0.0,
-        })
+        };
+        Ok((none, before))
     }
 
     /// The cost of the trajectory.
@@ -266,6 +299,17 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
             }
         }
         Ok(())
+    }
+}
+
+/// Whether a step may be taken that led from one cost to another.
+fn acceptable(before: Option<Cost>, after: Option<Cost>) -> bool {
+    match (before, after) {
+        (Some(before), Some(after)) if before.outside <= FEASIBLE => {
+            after.square <= before.square * (1.0 + COST_ROUNDING)
+        }
+        // What no noise explains must be mended, whatever the rest costs; and without control nothing is judged.
+        _ => true,
     }
 }
 

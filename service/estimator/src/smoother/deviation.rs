@@ -29,28 +29,38 @@ pub fn deviation<const D: usize>(
     let mut c = SMatrix::<f64, D, D>::from_fn(|row, column| {
         covariance[(row, column)] / (scale[row] * scale[column])
     });
-    let mut done = [false; D];
+    // The components in the order of elimination.
+    let mut order: [usize; D] = core::array::from_fn(|i| i);
     let mut square = 0.0;
-    for _ in 0..D {
-        let mut pivot = None;
-        let mut largest = SINGULAR;
-        for i in 0..D {
-            if !done[i] && c[(i, i)] > largest {
-                largest = c[(i, i)];
-                pivot = Some(i);
+    let mut rank = 0;
+    while rank < D {
+        let largest = (rank..D).fold(rank, |best, k| {
+            let variance = |k: usize| c[(order[k], order[k])];
+            if variance(k) > variance(best) {
+                k
+            } else {
+                best
+            }
+        });
+        order.swap(rank, largest);
+        let p = order[rank];
+        let variance = c[(p, p)];
+        if variance.is_nan() || variance <= SINGULAR {
+            break;
+        }
+        square += rest[p] * rest[p] / variance;
+        rank += 1;
+        for (k, &i) in order.iter().enumerate().skip(rank) {
+            let factor = c[(i, p)] / variance;
+            rest[i] -= factor * rest[p];
+            for &j in &order[rank..=k] {
+                let entry = c[(i, j)] - factor * c[(j, p)];
+                c[(i, j)] = entry;
+                c[(j, i)] = entry;
             }
         }
-        let Some(p) = pivot else {
-            break;
-        };
-        done[p] = true;
-        square += rest[p] * rest[p] / largest;
-        let column = c.column(p) / largest;
-        let (row, value) = (c.row(p).into_owned(), rest[p]);
-        c -= column * row;
-        rest -= column * value;
     }
-    let outside = (0..D).filter(|i| !done[*i]).fold(0.0, |outside: f64, i| {
+    let outside = order[rank..].iter().fold(0.0, |outside: f64, &i| {
         outside.max((rest[i] * scale[i]).abs())
     });
     Deviation { square, outside }

@@ -3,7 +3,8 @@
 //! [`chain`] says what is known: a prior, motions, observations. [`batch`] finds the trajectory by Gauss-Newton, with
 //! any parametrisation of [`filter::side`](crate::filter::side); [`mod@linearise`] makes each of its steps a linear
 //! problem, [`solver`] solves that in linear time, exactly where noise vanishes and where the prior is singular.
-//! [`mod@deviation`] measures residuals under such covariances.
+//! [`mod@deviation`] measures residuals under such covariances. [`window`] smooths the newest states only, for use beside
+//! a running filter; [`mod@preintegration`] makes one motion of many IMU samples.
 
 pub mod batch;
 pub mod chain;

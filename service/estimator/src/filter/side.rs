@@ -66,7 +66,7 @@ impl Side for Left {
     }
 
     fn difference<G: LieGroup<D>, const D: usize>(chi_hat: &G, chi: &G) -> SVector<f64, D> {
-        chi_hat.inverse().compose(chi).log()
+        chi_hat.between(chi).log()
     }
 
     fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D> {

@@ -62,6 +62,11 @@ pub trait LieGroup<const D: usize>: Copy + Clone + Debug + PartialEq {
     /// The inverse: `X X^-1 = identity`.
     fn inverse(&self) -> Self;
 
+    /// The element that leads from `X` to `Y`, `X^-1 Y`.
+    fn between(&self, other: &Self) -> Self {
+        self.inverse().compose(other)
+    }
+
     /// The adjoint matrix, `X exp(xi) X^-1 = exp(Ad_X xi)`.
     fn adjoint(&self) -> SMatrix<f64, D, D>;
 

@@ -34,6 +34,7 @@ mod track;
 
 use knot::{Knot, Passage};
 use prior::Prior;
+use track::Track;
 
 pub use fix::Fix;
 pub use prior::PriorForm;
@@ -155,7 +156,9 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             transition: SMatrix::identity(),
             predicted: first.covariance,
         };
-        self.knots.push_back(Knot::new(first.mean, &passage));
+        let track = Track::new(&passage.motion.motion().step);
+        let knot = Knot::new(first.mean, track, &first.covariance);
+        self.knots.push_back(knot);
         self.passages.push_back(passage);
         self.anisotropic = 0;
         self.gains_hold = self.is_constant();
@@ -173,15 +176,24 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     /// estimate, smoothed by all fixes since, is returned.
     pub fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
         let newest = self.newest_knot();
-        let (chi, transition) = motion.transition(&newest.chi);
+        let track = Track::new(&motion.motion().step);
+        let (chi, transition, predicted) = if self.is_affine() {
+            let predicted = track.carry_covariance(&newest.filtered, motion.noise());
+            (track.apply(&newest.chi), SMatrix::identity(), predicted)
+        } else {
+            let (chi, transition) = motion.transition(&newest.chi);
+            let carried = newest.filtered.transformed(&transition);
+            (chi, transition, carried.plus(motion.noise().matrix()))
+        };
         let mut passage = Passage {
             motion: *motion,
             transition,
-            predicted: newest.filtered,
+            predicted,
         };
-        passage.pass(&newest.filtered);
-        let knot = Knot::new(chi, &passage);
-        let left = self.is_full().then(|| self.marginalise(&knot, &passage));
+        let knot = Knot::new(chi, track, &predicted);
+        let left = self
+            .is_full()
+            .then(|| self.marginalise(&knot, &mut passage));
         self.knots.push_back(knot);
         self.passages.push_back(passage);
         left
@@ -189,8 +201,8 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// Removes the oldest state; what is known from it becomes the prior of the next one, which is the given one if
     /// the window is empty then. Gives its estimate.
-    fn marginalise(&mut self, knot: &Knot<G, D>, passage: &Passage<G, D>) -> G {
-        let fresh = self.must_linearise();
+    fn marginalise(&mut self, knot: &Knot<G, D>, passage: &mut Passage<G, D>) -> G {
+        let (fresh, affine) = (self.must_linearise(), self.is_affine());
         let first = &mut self.knots[0];
         if fresh {
             let prior = self.prior.at::<S>(&first.chi);
@@ -201,25 +213,32 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             let wanted = self.prior.mean_at::<S>(&first.chi);
             first.correct(wanted);
         }
-        let left = *first;
-        self.anisotropic -= usize::from(left.fix.is_some_and(|fix| !fix.is_isotropic()));
+        let (left, mean, filtered) = (first.chi, first.correction, first.filtered);
+        self.anisotropic -= usize::from(first.fix.is_some_and(|fix| !fix.is_isotropic()));
         self.knots.pop_front();
         self.passages.pop_front();
 
-        let next = self.knots.front().unwrap_or(knot);
-        let mut passage = *self.passages.front().unwrap_or(passage);
-        let offset = if fresh {
-            let jacobians = self.options.jacobians;
-            passage.link::<S>(&left.chi, &next.chi, &left.filtered, jacobians)
+        let (next, passage) = match (self.knots.front(), self.passages.front_mut()) {
+            (Some(next), Some(passage)) => (next, passage),
+            _ => (knot, passage),
+        };
+        let mean = if affine {
+            if fresh {
+                passage.predicted = next
+                    .track
+                    .carry_covariance(&filtered, passage.motion.noise());
+            }
+            next.track.carry(&mean) + next.offset::<S>(&left)
         } else {
-            next.offset::<S>(&left.chi)
+            let offset = passage.link::<S>(&left, &next.chi, &filtered, self.options.jacobians);
+            passage.transition * mean + offset
         };
         let correction = Gaussian {
-            mean: passage.transition * left.correction + offset,
+            mean,
             covariance: passage.predicted,
         };
         self.prior = Prior::new::<S>(self.options.prior, &next.chi, &correction);
-        left.chi
+        left
     }
 
     /// Takes in a fix of the newest state and smooths the window.
@@ -234,13 +253,15 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         }
         self.knots[last].fix = Some(fix);
         self.anisotropic += usize::from(!fix.is_isotropic());
-        let passage = self.passages[last];
+        let passage = self.must_linearise().then(|| self.passages[last]);
         let mut steps = 0;
         let outcome = self.iterate(&mut steps);
         if !matches!(outcome, Ok(correction) if correction.verdict == Verdict::Accepted) {
             self.anisotropic -= usize::from(!fix.is_isotropic());
-            self.passages[last] = passage;
-            self.knots[last].unsee(&passage);
+            if let Some(passage) = passage {
+                self.passages[last] = passage;
+            }
+            self.knots[last].unsee(&self.passages[last]);
             if steps > 0 {
                 for knot in &mut self.knots {
                     knot.chi = knot.before;
@@ -270,12 +291,9 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
                     correction.iterations = 0;
                     return Ok(correction);
                 }
-                for knot in &mut self.knots {
-                    knot.before = knot.chi;
-                }
             }
             *steps += 1;
-            self.backward()?;
+            self.backward(*steps == 1)?;
         }
         Ok(correction)
     }
@@ -300,9 +318,10 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
                 None => self.prior.mean_at::<S>(&knot.chi),
                 Some((chi, correction)) if affine => {
                     if fresh {
-                        passage.pass(&filtered);
+                        let noise = passage.motion.noise();
+                        passage.predicted = knot.track.carry_covariance(&filtered, noise);
                     }
-                    knot.carry(correction) + knot.offset::<S>(chi)
+                    knot.track.carry(correction) + knot.offset::<S>(chi)
                 }
                 Some((chi, correction)) => {
                     let offset = passage.link::<S>(chi, &knot.chi, &filtered, jacobians);
@@ -323,8 +342,8 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         Ok(())
     }
 
-    /// The disturbance smoother, and the step of all estimates.
-    fn backward(&mut self) -> Result<(), WindowError> {
+    /// The disturbance smoother, and the step of all estimates; the `first` of an update keeps what they were.
+    fn backward(&mut self, first: bool) -> Result<(), WindowError> {
         let affine = self.is_affine();
         let mut adjoint = SVector::<f64, D>::zeros();
         let mut sum = 0.0;
@@ -332,7 +351,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             let start = knot.smooth(adjoint);
             sum += knot.correction.sum();
             adjoint = if affine {
-                knot.carry_back(&start)
+                knot.track.carry_back(&start)
             } else {
                 passage.transition.tr_mul(&start)
             };
@@ -341,6 +360,9 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             } else {
                 S::from_left(&knot.chi) * knot.correction
             };
+            if first {
+                knot.before = knot.chi;
+            }
             knot.chi = S::retract(&knot.chi, &xi);
         }
         if sum.is_finite() {
@@ -403,7 +425,12 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         let later = self.knots.range(index + 1..);
         for (later, passage) in later.zip(self.passages.range(index + 1..)).rev() {
             let start = later.information(&information);
-            information = passage.transition.tr_mul(&start) * passage.transition;
+            let transition = if self.is_affine() {
+                later.track.matrix()
+            } else {
+                passage.transition
+            };
+            information = transition.tr_mul(&start) * transition;
         }
         let p = knot.filtered.matrix();
         let covariance = Covariance::from_upper(p - p * information * p);

@@ -9,7 +9,7 @@ use super::track::Track;
 use crate::filter::{Covariance, Side};
 use crate::model::InertialState;
 use crate::smoother::linearise;
-use crate::smoother::{Gain, Jacobians, Link, Preintegration};
+use crate::smoother::{Jacobians, Link, Preintegration};
 
 /// What the passes need of a fix beyond the fix.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +25,7 @@ pub(super) struct FixGain<const D: usize> {
 pub(super) struct Passage<G, const D: usize> {
     /// The motion from the state before; without meaning for the oldest state.
     pub motion: Preintegration<G, D>,
-    /// F of the motion.
+    /// F of the motion, where it is not group-affine with frozen Jacobians: there the track has it.
     pub transition: SMatrix<f64, D, D>,
     /// Covariance given all that was before this state.
     pub predicted: Covariance<D>,
@@ -50,13 +50,6 @@ impl<G: InertialState<D>, const D: usize> Passage<G, D> {
         self.predicted = filtered.transformed(&linear.transition).plus(&linear.noise);
         linear.offset
     }
-
-    /// The same for a motion whose F does not depend on the states: only the covariance.
-    pub fn pass(&mut self, filtered: &Covariance<D>) {
-        self.predicted = filtered
-            .transformed(&self.transition)
-            .plus(self.motion.noise().matrix());
-    }
 }
 
 /// A state, with what every pass over the window reads.
@@ -67,7 +60,7 @@ pub(super) struct Knot<G, const D: usize> {
     /// The estimate before the update that is under way.
     pub before: G,
     /// The motion from the state before, if it is group-affine.
-    track: Track,
+    pub track: Track,
     pub fix: Option<Fix>,
     /// Present if there is a fix and its gain has been computed.
     gain: Option<FixGain<D>>,
@@ -82,14 +75,14 @@ pub(super) struct Knot<G, const D: usize> {
 }
 
 impl<G: InertialState<D>, const D: usize> Knot<G, D> {
-    /// A state that nothing has seen yet.
-    pub fn new(chi: G, passage: &Passage<G, D>) -> Self {
+    /// A state that nothing has seen yet, at the end of `track`.
+    pub fn new(chi: G, track: Track, predicted: &Covariance<D>) -> Self {
         Self {
             chi,
             before: chi,
-            track: Track::new(&passage.motion.motion().step),
+            track,
             fix: None,
-            filtered: passage.predicted,
+            filtered: *predicted,
             gain: None,
             correction: SVector::zeros(),
             innovation: Vector3::zeros(),
@@ -107,19 +100,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     /// The offset of a group-affine motion from `before`, `xi = F xi_before + offset + w`, with frozen Jacobians:
     /// minus `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
     pub fn offset<S: Side>(&self, before: &G) -> SVector<f64, D> {
-        let expected = self.track.apply(before.pose());
-        let expected = G::from_parts(expected, before.gyro_bias(), before.accel_bias());
-        -S::Residual::difference(&expected, &self.chi)
-    }
-
-    /// `F xi` of a group-affine motion with frozen Jacobians.
-    pub fn carry(&self, xi: &SVector<f64, D>) -> SVector<f64, D> {
-        self.track.carry(xi)
-    }
-
-    /// `F^T xi` of the same.
-    pub fn carry_back(&self, xi: &SVector<f64, D>) -> SVector<f64, D> {
-        self.track.carry_back(xi)
+        -S::Residual::difference(&self.track.apply(before), &self.chi)
     }
 
     /// The gain, and the covariance after the fix. `false` if the innovation covariance is not positive
@@ -131,14 +112,19 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
             return true;
         };
         let noise = fix.covariance_b(&self.chi);
-        let Some((gain, filtered)) = Gain::new(predicted, &fix.jacobian(), &noise) else {
+        let h = fix.jacobian();
+        let p_ht = predicted.times_transposed(&h);
+        let mut innovation = noise;
+        for axis in 0..3 {
+            innovation +=
+                fix.seen(&p_ht.column(axis).into_owned()) * Vector3::ith(axis, 1.0).transpose();
+        }
+        let Some(weight) = inverse(&innovation) else {
             return false;
         };
-        self.gain = Some(FixGain {
-            gain: gain.gain,
-            weight: gain.innovation.inverse(),
-        });
-        self.filtered = filtered;
+        let gain = p_ht * weight;
+        self.filtered = predicted.corrected(&gain, &h, &noise);
+        self.gain = Some(FixGain { gain, weight });
         true
     }
 
@@ -175,4 +161,30 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
             _ => *end,
         }
     }
+}
+
+/// The inverse of a symmetric matrix by its Cholesky factor; `None` if it is not positive definite.
+fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    // The factor's rows, their diagonal inverted.
+    let root = |square: f64| (square > 0.0).then(|| 1.0 / square.sqrt());
+    let d0 = root(s[(0, 0)])?;
+    let (l10, l20) = (s[(1, 0)] * d0, s[(2, 0)] * d0);
+    let d1 = root(s[(1, 1)] - l10 * l10)?;
+    let l21 = (s[(2, 1)] - l20 * l10) * d1;
+    let d2 = root(s[(2, 2)] - l20 * l20 - l21 * l21)?;
+    // The inverse of the factor, of which the inverse is the square.
+    let (i10, i21) = (-l10 * d0 * d1, -l21 * d1 * d2);
+    let i20 = -(l20 * d0 + l21 * i10) * d2;
+    let (m01, m02, m12) = (i10 * d1 + i20 * i21, i20 * d2, i21 * d2);
+    Some(Matrix3::new(
+        d0 * d0 + i10 * i10 + i20 * i20,
+        m01,
+        m02,
+        m01,
+        d1 * d1 + i21 * i21,
+        m12,
+        m02,
+        m12,
+        d2 * d2,
+    ))
 }

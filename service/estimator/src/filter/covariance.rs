@@ -57,6 +57,13 @@ impl<const D: usize> Covariance<D> {
         Self(matrix)
     }
 
+    /// The same, of a product that is a covariance but for rounding.
+    pub(crate) fn from_rounded(matrix: SMatrix<f64, D, D>) -> Self {
+        let mut matrix = without_negative_variances(matrix);
+        mirror(&mut matrix);
+        Self(matrix)
+    }
+
     /// Independent components with these variances.
     pub fn from_variances(variances: &SVector<f64, D>) -> Self {
         Self(SMatrix::from_diagonal(variances))

@@ -21,13 +21,24 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
     /// The state with these parts; biases are dropped where the state has none.
     fn from_parts(pose: SE23, gyro_bias: Vector3<f64>, accel_bias: Vector3<f64>) -> Self;
 
-    /// The state after one step, the transition matrix F of the left-invariant error and the
-    /// covariance Q (symmetric) that the noise of the interval adds.
+    /// Whether a step is group-affine on the whole state, so that F does not depend on the state.
+    const IS_GROUP_AFFINE: bool;
+
+    /// The state after one step, and the transition matrix F of the left-invariant error.
+    fn transition(&self, step: &ImuStep) -> (Self, SMatrix<f64, D, D>);
+
+    /// The covariance Q (symmetric) that the noise of one interval adds to the left-invariant error.
+    fn process_noise(step: &ImuStep, noise: &ImuNoise) -> SMatrix<f64, D, D>;
+
+    /// The state after one step, with F and Q.
     fn advance(
         &self,
         step: &ImuStep,
         noise: &ImuNoise,
-    ) -> (Self, SMatrix<f64, D, D>, SMatrix<f64, D, D>);
+    ) -> (Self, SMatrix<f64, D, D>, SMatrix<f64, D, D>) {
+        let (next, f) = self.transition(step);
+        (next, f, Self::process_noise(step, noise))
+    }
 
     /// The step that the raw sample `measured` makes from this state, its biases removed.
     fn imu_step(
@@ -62,15 +73,16 @@ impl InertialState<9> for SE23 {
         pose
     }
 
-    fn advance(
-        &self,
-        step: &ImuStep,
-        noise: &ImuNoise,
-    ) -> (Self, SMatrix<f64, 9, 9>, SMatrix<f64, 9, 9>) {
+    const IS_GROUP_AFFINE: bool = true;
+
+    fn transition(&self, step: &ImuStep) -> (Self, SMatrix<f64, 9, 9>) {
         (
             step.step.apply(self).normalized(),
             step.step.left_jacobian(),
-            step.noise_covariance(noise),
         )
+    }
+
+    fn process_noise(step: &ImuStep, noise: &ImuNoise) -> SMatrix<f64, 9, 9> {
+        step.noise_covariance(noise)
     }
 }

@@ -4,6 +4,7 @@
 //!
 //! * [`dataset`] reads and writes dataset folders (CSV files and a `meta.json`) and merges them into one stream of events;
 //! * [`simulate`] makes such datasets: analytic trajectories, a MEMS IMU, position, velocity and heading fixes;
+//! * [`model`] says what each model of the daemon is fed and estimates, [`initial`] what state it starts from;
 //! * [`table`] reads and writes the estimate CSV, and holds the CSV reader both share;
 //! * [`evaluate`] compares estimates with the truth;
 //! * [`plot`] draws the comparison as SVG and assembles a report of one HTML file.
@@ -17,7 +18,9 @@ pub mod dataset;
 pub mod demo;
 pub mod evaluate;
 pub mod feed;
+pub mod initial;
 pub mod live;
+pub mod model;
 pub mod pace;
 pub mod plot;
 pub mod progress;

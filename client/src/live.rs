@@ -34,11 +34,11 @@ pub fn feed_live(
     let base_ns = monotonic_ns();
     let events = dataset.events();
     let progress = Progress::new("feeding", events.len());
-    let first_ns = dataset
-        .imu
-        .first()
+    let first_ns = events
+        .clone()
+        .find(Event::is_motion)
         .context("the simulation has no samples")?
-        .stamp_ns;
+        .stamp_ns();
     let pace = Pace::new(first_ns, 1.0);
     let mut summary = LiveSummary {
         sent: 0,

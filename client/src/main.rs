@@ -7,12 +7,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
-use inekf_client::dataset::{Dataset, Truth};
+use inekf_client::dataset::{Dataset, Odometry, Truth};
 use inekf_client::demo::{DemoOptions, demo};
 use inekf_client::live::feed_live;
 use inekf_client::pace::Speed;
 use inekf_client::replay::{ReplayOptions, replay};
-use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+use inekf_client::simulate::{Scenario, Simulation};
 use inekf_shared::message::{Counters, reason_name};
 use inekf_shared::topic::Instance;
 
@@ -69,20 +69,21 @@ struct DemoArguments {
 #[derive(Args)]
 struct SimulateArguments {
     /// road-circuit: a car on a circuit with bends and slopes; drone-loops: a drone in figures of
-    /// eight, banked; stand-then-drive: a car that stands for 15 s and drives off.
-    scenario: Scenario,
+    /// eight, banked; stand-then-drive: a car that stands for 15 s and drives off; planar-mismatch:
+    /// odometry and two position sources in the plane, whose models are wrong.
+    scenario: Simulation,
     /// The daemon to feed.
     #[arg(long, value_name = "NAME", default_value = "default")]
     instance: Instance,
     /// Seed of the sensors' noise: the same seed gives the same bytes.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// IMU rate, Hz.
-    #[arg(long, value_name = "HZ", default_value_t = 200.0)]
-    rate: f64,
-    /// Length, s.
-    #[arg(long, value_name = "S", default_value_t = 60.0)]
-    duration: f64,
+    /// Rate of IMU or odometry, Hz; by default 200, in the plane 10.
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Length, s; by default 60, in the plane 33.
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
     /// Write a dataset folder instead of feeding.
     #[arg(long, value_name = "DIR")]
     save: Option<PathBuf>,
@@ -93,7 +94,8 @@ struct SimulateArguments {
 
 #[derive(Args)]
 struct ReplayArguments {
-    /// The dataset folder: imu.csv, and position.csv, velocity.csv, heading.csv, meta.json if any.
+    /// The dataset folder: imu.csv or odometry.csv, as the daemon's model needs, and position.csv,
+    /// velocity.csv, heading.csv, meta.json if any.
     dir: PathBuf,
     /// Start a daemon with this configuration, and stop it afterwards.
     #[arg(long, value_name = "FILE")]
@@ -140,15 +142,9 @@ fn run_demo(arguments: DemoArguments) -> anyhow::Result<()> {
 
 fn run_simulate(arguments: SimulateArguments) -> anyhow::Result<()> {
     let instance = arguments.instance;
-    let dataset = simulate(
-        arguments.scenario,
-        &SimulationOptions {
-            seed: arguments.seed,
-            imu_rate_hz: arguments.rate,
-            duration_s: arguments.duration,
-            ..SimulationOptions::default()
-        },
-    )?;
+    let dataset = arguments
+        .scenario
+        .dataset(arguments.seed, arguments.rate, arguments.duration)?;
     if let Some(dir) = &arguments.save {
         dataset.save(dir)?;
         println!("saved    {}: {}", dir.display(), contents(&dataset));
@@ -174,9 +170,13 @@ fn contents(dataset: &Dataset) -> String {
         Truth::Planar(rows) => rows.len(),
         Truth::Spatial(rows) => rows.len(),
     };
+    let motion = match &dataset.odometry {
+        Odometry::None => format!("{} IMU samples", dataset.imu.len()),
+        Odometry::Planar(rows) => format!("{} rows of odometry", rows.len()),
+        Odometry::Spatial(rows) => format!("{} rows of odometry", rows.len()),
+    };
     format!(
-        "{} IMU samples, {} position fixes, {truth} rows of truth",
-        dataset.imu.len(),
+        "{motion}, {} position fixes, {truth} rows of truth",
         dataset.position.len()
     )
 }
@@ -205,8 +205,12 @@ fn run_replay(arguments: ReplayArguments) -> anyhow::Result<()> {
         late,
         lost,
         rejected,
+        unpaired,
     } = summary.last.counters;
     println!("fixes    {accepted} accepted, {gated} gated, {late} late; {lost} lost");
+    if unpaired > 0 {
+        println!("unpaired {unpaired}: their partner in the stack did not come in time");
+    }
     if rejected > 0 {
         let reasons: Vec<String> = summary
             .last

@@ -4,16 +4,21 @@
 //! use inekf_client::read::EstimateReader;
 //! use inekf_shared::topic::Instance;
 //!
-//! let mut reader = EstimateReader::open(&Instance::new("default")?)?;
+//! let mut reader: EstimateReader = EstimateReader::open(&Instance::new("default")?)?;
 //! while let Some(estimate) = reader.next_estimate()? {
 //!     println!("{} {:?}", estimate.head.stamp_ns, estimate.p_w_m);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! The estimates of the model `imu` are meant where nothing else is said; those of odometry are read as
+//! `EstimateReader::<EstimateSe2>` or `EstimateReader::<EstimateSe3>`. [`model_of`] says which a daemon has.
 
-use inekf_shared::message::EstimateSe23;
+use inekf_shared::message::{EstimateMessage, EstimateSe23};
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, LatestReader, Node, Subscriber, TransportError};
+
+use crate::model::Model;
 
 /// The estimates could not be received.
 #[derive(Debug, thiserror::Error)]
@@ -23,19 +28,28 @@ pub struct ReadError {
     pub cause: String,
 }
 
+/// The model of the daemon of `instance`; `None` if none has started, or if its estimates are of another version.
+///
+/// # Errors
+/// [`TransportError`], naming the service and the remedy.
+pub fn model_of(instance: &Instance) -> Result<Option<Model>, TransportError> {
+    let node = transport::open_node("inekf-model")?;
+    Ok(transport::estimate_model(&node, instance)?.and_then(Model::from_code))
+}
+
 /// Receives every estimate of one daemon, in order, and counts those it missed.
-pub struct EstimateReader {
-    estimates: Subscriber<EstimateSe23>,
+pub struct EstimateReader<E: EstimateMessage = EstimateSe23> {
+    estimates: Subscriber<E>,
     next_seq: Option<u64>,
     missed: u64,
     _node: Node,
 }
 
-impl EstimateReader {
+impl<E: EstimateMessage> EstimateReader<E> {
     /// A reader of `instance`; it gets what is published from now on.
     ///
     /// # Errors
-    /// [`TransportError`], naming the service and the remedy.
+    /// [`TransportError`], naming the service and the remedy; the daemon's model has to be that of `E`.
     pub fn open(instance: &Instance) -> Result<Self, TransportError> {
         Self::open_on(transport::open_node("inekf-reader")?, instance)
     }
@@ -45,7 +59,7 @@ impl EstimateReader {
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
     pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
-        let estimates = transport::estimate::<EstimateSe23>(&node, instance)?.subscriber()?;
+        let estimates = transport::estimate::<E>(&node, instance)?.subscriber()?;
         Ok(Self {
             estimates,
             next_seq: None,
@@ -58,12 +72,12 @@ impl EstimateReader {
     ///
     /// # Errors
     /// [`ReadError`].
-    pub fn next_estimate(&mut self) -> Result<Option<EstimateSe23>, ReadError> {
+    pub fn next_estimate(&mut self) -> Result<Option<E>, ReadError> {
         let received = self.estimates.receive().map_err(|error| ReadError {
             cause: error.to_string(),
         })?;
         Ok(received.map(|sample| {
-            let seq = sample.head.estimate_seq;
+            let seq = sample.head().estimate_seq;
             // A smaller number is a daemon that has started again.
             if let Some(expected) = self.next_seq
                 && seq > expected
@@ -82,12 +96,12 @@ impl EstimateReader {
 }
 
 /// Reads the newest estimate only, as a controller would.
-pub struct LatestEstimate {
-    latest: LatestReader<EstimateSe23>,
+pub struct LatestEstimate<E: EstimateMessage = EstimateSe23> {
+    latest: LatestReader<E>,
     _node: Node,
 }
 
-impl LatestEstimate {
+impl<E: EstimateMessage> LatestEstimate<E> {
     /// A reader of the newest estimate of `instance`, whose daemon must be running.
     ///
     /// # Errors
@@ -101,7 +115,7 @@ impl LatestEstimate {
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
     pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
-        let latest = transport::open_latest::<EstimateSe23>(&node, instance)?.reader()?;
+        let latest = transport::open_latest::<E>(&node, instance)?.reader()?;
         Ok(Self {
             latest,
             _node: node,
@@ -109,7 +123,7 @@ impl LatestEstimate {
     }
 
     /// The newest estimate; its `estimate_seq` is 0 before the first.
-    pub fn read(&self) -> EstimateSe23 {
+    pub fn read(&self) -> E {
         self.latest.read()
     }
 }

@@ -9,16 +9,17 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use inekf_shared::message::{ControlResponse, EstimateSe23};
+use inekf_shared::message::{ControlResponse, EstimateSe2, EstimateSe3, EstimateSe23};
 use inekf_shared::topic::Instance;
 
 use crate::daemon::{Daemon, private_instance};
-use crate::dataset::{Dataset, Odometry};
+use crate::dataset::{Dataset, Event};
+use crate::model::{Estimate, Model};
 use crate::pace::{Pace, Speed};
 use crate::progress::Progress;
 use crate::rows::{RowBuilder, state, triangle};
-use crate::session::{Session, why_no_estimate};
-use crate::table::{EstimateWriter, Layout};
+use crate::session::{Session, running_model, why_no_estimate};
+use crate::table::EstimateWriter;
 
 /// What to replay, and how.
 #[derive(Clone, Debug)]
@@ -57,16 +58,6 @@ pub struct ReplaySummary {
 /// came; the error says which.
 pub fn replay(options: &ReplayOptions) -> anyhow::Result<ReplaySummary> {
     let dataset = Dataset::load(&options.dir)?;
-    if dataset.imu.is_empty() {
-        bail!(
-            "{} has no imu.csv; this version estimates from an IMU only{}",
-            options.dir.display(),
-            match dataset.odometry {
-                Odometry::None => "",
-                _ => " (its odometry is not used)",
-            }
-        );
-    }
     let (daemon, instance) = match &options.config {
         Some(config) => {
             let instance = private_instance("replay")?;
@@ -74,7 +65,7 @@ pub fn replay(options: &ReplayOptions) -> anyhow::Result<ReplaySummary> {
         }
         None => (None, options.instance.clone()),
     };
-    let summary = feed(&dataset, &instance, options);
+    let summary = feed_any(&dataset, &instance, options);
     // Stop the daemon in either case; the first error is the one to report.
     let stopped = daemon.map_or(Ok(()), Daemon::stop);
     let summary = summary?;
@@ -82,18 +73,38 @@ pub fn replay(options: &ReplayOptions) -> anyhow::Result<ReplaySummary> {
     Ok(summary)
 }
 
-fn feed(
+/// Feeds the daemon with what its model takes.
+fn feed_any(
     dataset: &Dataset,
     instance: &Instance,
     options: &ReplayOptions,
 ) -> anyhow::Result<ReplaySummary> {
-    let mut session = Session::open(instance)?;
+    match running_model(instance)? {
+        Model::Imu => feed::<EstimateSe23>(dataset, instance, options),
+        Model::Odometry3d => feed::<EstimateSe3>(dataset, instance, options),
+        Model::Odometry2d => feed::<EstimateSe2>(dataset, instance, options),
+    }
+}
+
+fn feed<E: Estimate>(
+    dataset: &Dataset,
+    instance: &Instance,
+    options: &ReplayOptions,
+) -> anyhow::Result<ReplaySummary> {
+    let events = dataset
+        .events_for(E::KIND)
+        .with_context(|| options.dir.display().to_string())?;
+    let mut session = Session::<E>::open(instance)?;
     session.set_initial(&dataset.meta)?;
     let mut output = Output::new(&options.out, options.covariance)?;
-    let events = dataset.events();
     let progress = Progress::new("replaying", events.len());
+    // Time starts with the motion; fixes before it are sent at once.
+    let first_ns = events
+        .clone()
+        .find(Event::is_motion)
+        .map_or(0, |event| event.stamp_ns());
     let pace = match options.speed {
-        Speed::Times(times) => Some(Pace::new(dataset.imu[0].stamp_ns, times)),
+        Speed::Times(times) => Some(Pace::new(first_ns, times)),
         Speed::Max => None,
     };
 
@@ -127,16 +138,16 @@ fn feed(
 }
 
 /// The estimate CSV under construction. Its header needs the dimension of the first estimate.
-struct Output {
+struct Output<E> {
     path: PathBuf,
     covariance: bool,
-    builder: RowBuilder,
+    builder: RowBuilder<E>,
     writer: Option<EstimateWriter<BufWriter<File>>>,
     file: Option<File>,
     rows: usize,
 }
 
-impl Output {
+impl<E: Estimate> Output<E> {
     fn new(path: &Path, covariance: bool) -> anyhow::Result<Self> {
         let file = File::create(path).with_context(|| format!("creating {}", path.display()))?;
         Ok(Self {
@@ -149,14 +160,14 @@ impl Output {
         })
     }
 
-    fn take(&mut self, estimate: &EstimateSe23) -> anyhow::Result<()> {
+    fn take(&mut self, estimate: &E) -> anyhow::Result<()> {
         match self.builder.push(*estimate) {
             Some(complete) => self.write(&complete),
             None => Ok(()),
         }
     }
 
-    fn write(&mut self, estimate: &EstimateSe23) -> anyhow::Result<()> {
+    fn write(&mut self, estimate: &E) -> anyhow::Result<()> {
         let triangle = if self.covariance {
             triangle(estimate)
         } else {
@@ -164,15 +175,17 @@ impl Output {
         };
         let writing = || format!("writing {}", self.path.display());
         if let Some(file) = self.file.take() {
-            let dimension = self.covariance.then_some(estimate.head.dimension as usize);
+            let dimension = self
+                .covariance
+                .then_some(estimate.head().dimension as usize);
             self.writer = Some(
-                EstimateWriter::new(BufWriter::new(file), Layout::Navigation, dimension)
+                EstimateWriter::new(BufWriter::new(file), E::LAYOUT, dimension)
                     .with_context(writing)?,
             );
         }
         if let Some(writer) = &mut self.writer {
             writer
-                .write(estimate.head.stamp_ns, &state(estimate), triangle)
+                .write(estimate.head().stamp_ns, &state(estimate), triangle)
                 .with_context(writing)?;
             self.rows += 1;
         }

@@ -1,61 +1,66 @@
-//! From the stream of estimates to the rows of the estimate CSV.
+//! From the stream of estimates to the rows of the estimate CSV, whatever the model.
 //!
-//! One row per propagated sample, as it is after the updates due at that stamp: an update of the
-//! same stamp replaces the row, one between two samples has no row of its own.
+//! One row per propagated sample, as it is after the updates due at that stamp: the last estimate of a
+//! stamp is the row, even if its fix was held back until the next sample came; an update between two
+//! samples has no row of its own.
 
 use inekf_shared::message::{ESTIMATE_PROPAGATED, EstimateSe23};
 
+use crate::model::Estimate;
 use crate::table::estimate::triangle_len;
 use crate::table::{EstimateRow, EstimateState};
 
-/// Turns estimates into rows, one estimate late.
-#[derive(Debug, Default)]
-pub struct RowBuilder {
-    current: Option<EstimateSe23>,
+/// Turns estimates into rows, one row late.
+#[derive(Clone, Debug)]
+pub struct RowBuilder<E = EstimateSe23> {
+    current: Option<E>,
 }
 
-impl RowBuilder {
+impl<E> Default for RowBuilder<E> {
+    fn default() -> Self {
+        Self { current: None }
+    }
+}
+
+impl<E: Estimate> RowBuilder<E> {
     /// Takes the next estimate; returns the row that it completes.
-    pub fn push(&mut self, estimate: EstimateSe23) -> Option<EstimateSe23> {
-        if estimate.head.flags & ESTIMATE_PROPAGATED != 0 {
-            return self.current.replace(estimate);
-        }
+    pub fn push(&mut self, estimate: E) -> Option<E> {
+        let head = *estimate.head();
         if let Some(current) = &mut self.current
-            && current.head.stamp_ns == estimate.head.stamp_ns
+            && current.head().stamp_ns == head.stamp_ns
         {
             *current = estimate;
+            return None;
+        }
+        if head.flags & ESTIMATE_PROPAGATED != 0 {
+            return self.current.replace(estimate);
         }
         None
     }
 
     /// The last row.
-    pub fn finish(self) -> Option<EstimateSe23> {
+    pub fn finish(self) -> Option<E> {
         self.current
     }
 }
 
 /// The estimate as a row of the CSV, with the upper triangle of its covariance.
-pub fn row(estimate: &EstimateSe23) -> EstimateRow {
+pub fn row<E: Estimate>(estimate: &E) -> EstimateRow {
     EstimateRow {
-        stamp_ns: estimate.head.stamp_ns,
+        stamp_ns: estimate.head().stamp_ns,
         state: state(estimate),
         covariance: triangle(estimate).to_vec(),
     }
 }
 
 /// The mean.
-pub fn state(estimate: &EstimateSe23) -> EstimateState {
-    EstimateState::Navigation {
-        q_wb: estimate.q_wb,
-        v_w_mps: estimate.v_w_mps,
-        p_w_m: estimate.p_w_m,
-        gyro_bias_rps: estimate.gyro_bias_rps,
-        accel_bias_mps2: estimate.accel_bias_mps2,
-    }
+pub fn state<E: Estimate>(estimate: &E) -> EstimateState {
+    estimate.mean()
 }
 
 /// The part of the covariance that is in use.
-pub fn triangle(estimate: &EstimateSe23) -> &[f64] {
-    let entries = triangle_len(estimate.head.dimension as usize);
-    &estimate.covariance[..entries.min(estimate.covariance.len())]
+pub fn triangle<E: Estimate>(estimate: &E) -> &[f64] {
+    let entries = triangle_len(estimate.head().dimension as usize);
+    let covariance = estimate.covariance();
+    &covariance[..entries.min(covariance.len())]
 }

@@ -4,15 +4,18 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use inekf_shared::message::{
-    ControlResponse, EstimateSe23, MODEL_IMU, STATE_ALIGNING, STATE_WAITING, StateVector, Zero,
-    reason_name, state_name, triangle_index, waiting_for_name,
+    ControlResponse, EstimateSe23, STATE_ALIGNING, STATE_WAITING, StateVector, reason_name,
+    state_name, waiting_for_name,
 };
 use inekf_shared::topic::Instance;
+use inekf_shared::transport;
 
 use crate::control::Controller;
-use crate::dataset::{Event, Initial, Meta};
+use crate::dataset::{Event, Meta};
 use crate::feed::Feeder;
-use crate::read::EstimateReader;
+use crate::initial::state_vector;
+use crate::model::{Estimate, Model};
+use crate::read::{EstimateReader, model_of};
 
 /// How long a daemon may take to answer.
 const ANSWER_WITHIN: Duration = Duration::from_secs(5);
@@ -23,27 +26,50 @@ const IN_FLIGHT: usize = 256;
 /// samples, but not one so far ahead that its clock seems wrong.
 const IN_FLIGHT_NS: u64 = 10_000_000_000;
 
-/// Ports of every kind to one daemon.
-pub struct Session {
+/// The model of the running daemon of `instance`.
+///
+/// # Errors
+/// No daemon answers, or it is of another version.
+pub fn running_model(instance: &Instance) -> anyhow::Result<Model> {
+    if let Some(model) = model_of(instance)? {
+        return Ok(model);
+    }
+    require_answer(&mut Controller::open(instance, ANSWER_WITHIN)?, instance)?;
+    if let Some(model) = model_of(instance)? {
+        return Ok(model);
+    }
+    // A daemon answers, but its estimates are none of ours: opening them says what they are.
+    transport::estimate::<EstimateSe23>(&transport::open_node("inekf-model")?, instance)?;
+    bail!("the daemon of instance {instance} publishes no estimates: start it again")
+}
+
+/// Asks for a sign of life.
+fn require_answer(controller: &mut Controller, instance: &Instance) -> anyhow::Result<()> {
+    controller
+        .barrier()
+        .with_context(|| format!("no daemon of instance {instance} is running"))?;
+    Ok(())
+}
+
+/// Ports of every kind to one daemon, whose model is that of the estimates `E`.
+pub struct Session<E: Estimate = EstimateSe23> {
     feeder: Feeder,
-    reader: EstimateReader,
+    reader: EstimateReader<E>,
     controller: Controller,
     in_flight: usize,
     settled_ns: u64,
 }
 
-impl Session {
+impl<E: Estimate> Session<E> {
     /// Opens all ports to `instance` and checks that its daemon answers.
     ///
     /// # Errors
-    /// A port cannot be opened, or no daemon answers.
+    /// A port cannot be opened, the daemon has another model, or no daemon answers.
     pub fn open(instance: &Instance) -> anyhow::Result<Self> {
         let mut controller = Controller::open(instance, ANSWER_WITHIN)?;
         let reader = EstimateReader::open(instance)?;
         let feeder = Feeder::open(instance)?;
-        controller
-            .barrier()
-            .with_context(|| format!("no daemon of instance {instance} is running"))?;
+        require_answer(&mut controller, instance)?;
         Ok(Self {
             feeder,
             reader,
@@ -56,10 +82,9 @@ impl Session {
     /// Sets the daemon's state to the one the dataset starts from, if it names one.
     ///
     /// # Errors
-    /// The state is not one of the IMU model, or the daemon refuses it.
+    /// The state is not one of the daemon's model, or the daemon refuses it.
     pub fn set_initial(&mut self, meta: &Meta) -> anyhow::Result<()> {
-        if let Some(initial) = &meta.initial {
-            let state = state_vector(initial, meta.p0_diag.as_deref())?;
+        if let Some(state) = state_vector(meta, E::KIND)? {
             self.controller.set_state(state)?;
         }
         Ok(())
@@ -84,7 +109,7 @@ impl Session {
     pub fn send_lossless(
         &mut self,
         event: &Event,
-        take: &mut impl FnMut(EstimateSe23) -> anyhow::Result<()>,
+        take: &mut impl FnMut(E) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let stamp_ns = event.stamp_ns();
         let stretch_ns = stamp_ns.saturating_sub(self.settled_ns);
@@ -105,7 +130,7 @@ impl Session {
     /// As [`Session::send_lossless`].
     pub fn settle(
         &mut self,
-        take: &mut impl FnMut(EstimateSe23) -> anyhow::Result<()>,
+        take: &mut impl FnMut(E) -> anyhow::Result<()>,
     ) -> anyhow::Result<ControlResponse> {
         let response = self.controller.barrier()?;
         self.in_flight = 0;
@@ -119,7 +144,7 @@ impl Session {
     /// An estimate was lost, or what `take` returns.
     pub fn take_estimates(
         &mut self,
-        take: &mut impl FnMut(EstimateSe23) -> anyhow::Result<()>,
+        take: &mut impl FnMut(E) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         while let Some(estimate) = self.reader.next_estimate()? {
             take(estimate)?;
@@ -169,39 +194,4 @@ pub fn why_no_estimate(response: &ControlResponse) -> String {
         }
     }
     text
-}
-
-/// The set-state request for a dataset's initial state.
-fn state_vector(initial: &Initial, p0_diag: Option<&[f64]>) -> anyhow::Result<StateVector> {
-    let Initial::Spatial {
-        stamp_ns,
-        q_wb,
-        v_w_mps,
-        p_w_m,
-        gyro_bias_rps,
-        accel_bias_mps2,
-    } = initial
-    else {
-        bail!("meta.json: initial is planar, but this version estimates from an IMU only");
-    };
-    // Without variances the daemon takes those of its configuration.
-    let p0_diag = p0_diag.unwrap_or_default();
-    let mut state = StateVector {
-        model: MODEL_IMU,
-        dimension: u32::try_from(p0_diag.len()).unwrap_or(u32::MAX),
-        stamp_ns: *stamp_ns,
-        q_wb: *q_wb,
-        v_w_mps: *v_w_mps,
-        p_w_m: *p_w_m,
-        gyro_bias_rps: *gyro_bias_rps,
-        accel_bias_mps2: *accel_bias_mps2,
-        ..StateVector::ZERO
-    };
-    for (i, variance) in p0_diag.iter().enumerate() {
-        let slot = triangle_index(i, i, p0_diag.len())
-            .and_then(|index| state.covariance.get_mut(index))
-            .context("meta.json: P0_diag has more than 15 entries")?;
-        *slot = *variance;
-    }
-    Ok(state)
 }

@@ -8,12 +8,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
-use inekf::filter::{Left, Side};
-use inekf::lie::SE23;
-use inekf::model::{InertialState, NavState};
-use inekf_service::config::{Config, Invariance};
+use inekf::filter::UpdateError;
+use inekf_service::config::Config;
 use inekf_service::daemon::{self, Ports};
-use inekf_service::engine::{InertialEngine, Settings};
+use inekf_service::engine::{self, Engine, Model, Use};
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, inspect};
 
@@ -79,12 +77,13 @@ fn main() -> ExitCode {
 
 fn check(file: &Path) -> anyhow::Result<()> {
     let config = Config::load(file)?;
+    engine::build(&config, Built).map_err(|error| unsolvable(file, &error))?;
     println!(
         "{}: good: model {}, estimator {}, {} states",
         file.display(),
         config.model,
         config.estimator,
-        if config.biases { 15 } else { 9 }
+        config.error_states(),
     );
     Ok(())
 }
@@ -123,23 +122,54 @@ fn serve(file: &Path, instance: &str) -> anyhow::Result<()> {
     let signalled = Arc::clone(&stop);
     ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
         .context("installing the handler of SIGINT and SIGTERM")?;
-    match (config.invariance, config.biases) {
-        (Invariance::Left, true) => run::<NavState, Left, 15>(&config, &instance, &stop),
-        (Invariance::Left, false) => run::<SE23, Left, 9>(&config, &instance, &stop),
+    let daemon = Serve {
+        config: &config,
+        instance: &instance,
+        stop: &stop,
+    };
+    engine::build(&config, daemon).map_err(|error| unsolvable(file, &error))?
+}
+
+/// Why a configuration that reads well cannot be run.
+fn unsolvable(file: &Path, error: &UpdateError) -> anyhow::Error {
+    anyhow::anyhow!("{}: {error}", file.display())
+}
+
+/// Runs an engine as a daemon.
+struct Serve<'a> {
+    config: &'a Config,
+    instance: &'a Instance,
+    stop: &'a AtomicBool,
+}
+
+impl Use for Serve<'_> {
+    type Output = anyhow::Result<()>;
+
+    fn with<M: Model>(self, engine: Engine<M>) -> anyhow::Result<()> {
+        run(engine, self.config, self.instance, self.stop)
     }
 }
 
-fn run<G: InertialState<D>, S: Side, const D: usize>(
+/// Nothing but the proof that there is an engine.
+struct Built;
+
+impl Use for Built {
+    type Output = ();
+
+    fn with<M: Model>(self, _engine: Engine<M>) {}
+}
+
+fn run<M: Model>(
+    mut engine: Engine<M>,
     config: &Config,
     instance: &Instance,
     stop: &AtomicBool,
 ) -> anyhow::Result<()> {
-    let mut engine = InertialEngine::<G, S, D>::new(Settings::new(config));
     let mut ports = Ports::open(instance, config.runtime.wait)?;
     let mut out = std::io::stdout();
     writeln!(
         out,
-        "ready: instance {instance}, process {}, model {}, {D} states, wait {}",
+        "ready: instance {instance}, process {}, model {}, wait {}",
         std::process::id(),
         config.model,
         config.runtime.wait,

@@ -4,12 +4,20 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use inekf_service::config::{
-    Config, Discretisation, Estimator, GapPolicy, HeadingSource, Health, Hold, Imu, Initial,
-    Invariance, KeySpec, Late, Level, Model, Noise, PositionSource, Runtime, Transport, Update,
-    VelocitySource, WaitMode, WhiteNoise, schema,
+    Axis, Config, Discretisation, Estimator, GapPolicy, HeadingSource, Health, Hinf, HinfGain,
+    Hold, Imu, IncrementNoise, Inertial, InertialNoise, Initial, Invariance, KeySpec, Late, Level,
+    Mismatch, Mismatched, MissingPartner, Model, Motion, Odometry, OdometryNoise, PositionSource,
+    Rows, Runtime, Stacking, Transport, Update, VelocitySource, WaitMode, WhiteNoise, Wrong,
+    schema,
 };
 
 const MINIMAL: &str = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+
+const MINIMAL_ODOMETRY: &str =
+    "model = 'odometry2d'\n[noise]\nrotation_density = 3e-3\ntranslation_density = 1e-2\n";
+
+/// The examples: one for each kind of motion.
+const EXAMPLES: [&str; 2] = ["config/example.toml", "config/example_odometry.toml"];
 
 fn service_file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
@@ -79,7 +87,7 @@ fn config_md_documents_what_the_reader_knows() {
     assert_eq!(documented, known, "same rows, in another order");
 }
 
-/// A key line of the example file.
+/// A key line of an example file.
 struct ExampleKey {
     header: String,
     name: String,
@@ -87,22 +95,23 @@ struct ExampleKey {
     enabled: bool,
 }
 
-/// Every key line of the example file, those behind a `#` too.
-fn example_keys() -> Vec<ExampleKey> {
+/// Every key line of an example file, those behind a `#` too.
+fn example_keys(file: &str) -> Vec<ExampleKey> {
     let mut header = String::new();
     let mut keys = Vec::new();
-    for line in text_of("config/example.toml").lines() {
+    for line in text_of(file).lines() {
         let code = line.split(" #").next().unwrap_or("").trim();
-        if code.starts_with('[') {
-            header = code.to_owned();
-        } else if let Some((name, value)) = code.split_once(" = ")
-            && !name.starts_with("# ")
+        let live = code.trim_start_matches('#');
+        if live.starts_with('[') {
+            header = live.to_owned();
+        } else if let Some((name, value)) = live.split_once(" = ")
+            && !name.starts_with(' ')
         {
             keys.push(ExampleKey {
                 header: header.clone(),
-                name: name.trim_start_matches('#').to_owned(),
+                name: name.to_owned(),
                 value: value.to_owned(),
-                enabled: !name.starts_with('#'),
+                enabled: live == code,
             });
         }
     }
@@ -110,19 +119,31 @@ fn example_keys() -> Vec<ExampleKey> {
 }
 
 #[test]
-fn the_example_names_every_key_with_its_default() {
+fn the_examples_name_every_key_with_its_default() {
     let specs = schema();
-    let keys = example_keys();
-    let in_example: Vec<(&str, &str)> = keys.iter().map(|key| (&*key.header, &*key.name)).collect();
-    let in_schema: Vec<(&str, &str)> = specs
-        .iter()
-        .map(|spec| (&*spec.header, spec.name))
-        .collect();
-    assert_eq!(in_example, in_schema);
-    for (key, spec) in keys.iter().zip(&specs) {
-        if !["none", "required"].contains(&&*spec.default) {
-            assert_eq!(key.value, spec.default, "{} {}", key.header, key.name);
+    let mut named = vec![false; specs.len()];
+    for file in EXAMPLES {
+        let mut rest = specs.iter().enumerate();
+        for key in example_keys(file) {
+            let found = rest.find(|(_, spec)| key.header == spec.header && key.name == spec.name);
+            let (index, spec) = found.unwrap_or_else(|| {
+                panic!(
+                    "{file}: {} {}: no such key, or not in the order of the schema",
+                    key.header, key.name
+                )
+            });
+            named[index] = true;
+            if !["none", "required", "varies"].contains(&&*spec.default) {
+                assert_eq!(
+                    key.value, spec.default,
+                    "{file}: {} {}",
+                    key.header, key.name
+                );
+            }
         }
+    }
+    for (spec, named) in specs.iter().zip(named) {
+        assert!(named, "no example names {} {}", spec.header, spec.name);
     }
 }
 
@@ -134,23 +155,44 @@ fn the_example_is_the_minimal_file_written_out() {
 }
 
 #[test]
+fn the_example_of_odometry_is_a_minimal_file_written_out() {
+    let example = Config::load(service_file("config/example_odometry.toml")).unwrap();
+    let minimal = format!(
+        "mismatch = 'adaptive'\n{MINIMAL_ODOMETRY}[[mismatched]]\nwhat = 'odometry_scale'\nsigma = 0.08\n"
+    );
+    let minimal = Config::from_toml_str(&minimal, "minimal").unwrap();
+    assert_eq!(example, minimal);
+}
+
+/// An example without the lines that begin with one of `out`, and with those `on` that are switched off in it.
+fn switched(file: &str, out: &[&str], on: &[&str]) -> String {
+    let begins = |line: &str, names: &[&str]| names.iter().any(|name| line.starts_with(name));
+    let text = text_of(file);
+    let kept = text.lines().filter(|line| !begins(line, out));
+    kept.map(|line| match line.strip_prefix('#') {
+        Some(live) if begins(live, on) => live.to_owned() + "\n",
+        _ => line.to_owned() + "\n",
+    })
+    .collect()
+}
+
+#[test]
 fn what_the_example_switches_off_can_be_switched_on() {
-    let text = text_of("config/example.toml");
-    let lines = text.lines().filter(|line| !line.contains("_density = "));
-    let all_on: String = lines
-        .map(|line| {
-            let disabled = line.starts_with('#') && !line.starts_with("# ") && line.len() > 1;
-            if disabled {
-                line[1..].to_owned() + "\n"
-            } else {
-                line.to_owned() + "\n"
-            }
-        })
-        .collect::<String>()
+    let disabled: Vec<String> = example_keys(EXAMPLES[0])
+        .into_iter()
+        .filter(|key| !key.enabled)
+        .map(|key| key.name)
+        .collect();
+    assert!(!disabled.is_empty());
+    let on: Vec<&str> = disabled.iter().map(|name| &**name).collect();
+    let all_on = switched(EXAMPLES[0], &["gyro_density", "accel_density"], &on)
         .replace("level = \"accelerometer\"", "level = \"given\"");
     let config = Config::from_toml_str(&all_on, "all on").unwrap();
+    let Motion::Inertial(inertial) = &config.motion else {
+        panic!("{config:?}")
+    };
     assert_eq!(
-        config.noise.white,
+        inertial.noise.white,
         WhiteNoise::PerSample {
             gyro: 3e-3,
             accel: 0.2
@@ -159,7 +201,84 @@ fn what_the_example_switches_off_can_be_switched_on() {
     assert_eq!(config.initial.level, Level::Given);
     assert_eq!(config.initial.position_m, Some([0.0; 3]));
     assert_eq!(config.update.gate_probability, Some(0.9999));
-    assert!(example_keys().iter().any(|key| !key.enabled));
+}
+
+#[test]
+fn what_the_example_of_odometry_switches_off_can_be_switched_on() {
+    let read =
+        |text: &str| Config::from_toml_str(text, "switched on").unwrap_or_else(|e| panic!("{e}"));
+    let odometry = |config: &Config| match &config.motion {
+        Motion::Odometry(odometry) => odometry.clone(),
+        Motion::Inertial(_) => panic!("{config:?}"),
+    };
+    let file = EXAMPLES[1];
+
+    let pairs = ["rotation_sigma", "translation_sigma", "lateral_sigma"];
+    let densities = ["rotation_density", "translation_density"];
+    let config = read(&switched(
+        file,
+        &densities,
+        &[&pairs[..], &["position_", "gate"]].concat(),
+    ));
+    let expected = IncrementNoise::PerRow {
+        rotation: 1e-4,
+        translation: 1e-3,
+        lateral: 1e-3,
+    };
+    assert_eq!(odometry(&config).noise.white, expected);
+    assert_eq!(config.initial.position_m, Some([0.0; 3]));
+    assert_eq!(config.update.gate_probability, Some(0.9999));
+
+    let config = read(&switched(file, &[], &["lateral_density"]));
+    let expected = IncrementNoise::Density {
+        rotation: 3e-3,
+        translation: 1e-2,
+        lateral: 1e-2,
+    };
+    assert_eq!(odometry(&config).noise.white, expected);
+
+    let in_space = ["level", "roll", "pitch", "axis", "source = 0"];
+    let text = switched(file, &[], &in_space)
+        .replace("odometry2d", "odometry3d")
+        .replace(
+            "what = \"odometry_scale\"",
+            "what = \"measurement_rotation\"",
+        );
+    let config = read(&text);
+    assert_eq!(config.initial.level, Level::Given);
+    let what = Wrong::MeasurementRotation {
+        source: 0,
+        axis: Some(Axis::Z),
+    };
+    assert_eq!(config.mismatched[0].what, what);
+
+    let text = switched(file, &["burst_sigma"], &["walk"])
+        .replace("mismatch = \"adaptive\"", "mismatch = \"augmented\"");
+    assert_eq!(read(&text).mismatched[0].walk, 0.0);
+
+    let stacking = ["[stacking]", "sources", "tolerance", "wait_s", "missing"];
+    let text = switched(file, &[], &stacking) + "[[position_source]]\nid = 1\n";
+    let expected = Stacking {
+        sources: [0, 1],
+        tolerance_s: 0.001,
+        wait_s: 0.2,
+        missing: MissingPartner::Unconstrained,
+    };
+    assert_eq!(read(&text).stacking, Some(expected));
+
+    let mismatched = ["mismatch", "[[mismatched", "what", "sigma = ", "burst"];
+    let text = switched(
+        file,
+        &mismatched,
+        &["[hinf]", "gamma", "gain", "noise_factor"],
+    )
+    .replace("estimator = \"inekf\"", "estimator = \"invariant-hinf\"");
+    let expected = Hinf {
+        gamma: 0.02,
+        gain: HinfGain::Widened,
+        noise_factor: 3.0,
+    };
+    assert_eq!(read(&text).hinf, Some(expected));
 }
 
 #[test]
@@ -167,25 +286,36 @@ fn a_minimal_file_takes_the_documented_defaults() {
     let expected = Config {
         model: Model::Imu,
         estimator: Estimator::Inekf,
-        invariance: Invariance::Left,
-        biases: true,
-        discretisation: Discretisation::Zoh,
-        hold: Hold::Backward,
-        gravity_mps2: 9.80665,
-        imu: Imu {
-            max_gap_s: 0.5,
-            on_gap: GapPolicy::Inflate,
-            max_gyro_rps: 50.0,
-            max_accel_mps2: 500.0,
-        },
-        noise: Noise {
-            white: WhiteNoise::Density {
-                gyro: 3e-4,
-                accel: 2e-2,
+        invariance: Some(Invariance::Left),
+        mismatch: Mismatch::None,
+        motion: Motion::Inertial(Inertial {
+            biases: true,
+            discretisation: Discretisation::Zoh,
+            hold: Hold::Backward,
+            gravity_mps2: 9.80665,
+            imu: Imu {
+                max_gap_s: 0.5,
+                on_gap: GapPolicy::Inflate,
+                max_gyro_rps: 50.0,
+                max_accel_mps2: 500.0,
             },
-            gyro_bias_walk: 0.0,
-            accel_bias_walk: 0.0,
-        },
+            noise: InertialNoise {
+                white: WhiteNoise::Density {
+                    gyro: 3e-4,
+                    accel: 2e-2,
+                },
+                gyro_bias_walk: 0.0,
+                accel_bias_walk: 0.0,
+            },
+            velocity_sources: vec![VelocitySource {
+                id: 0,
+                sigma_scale: 1.0,
+            }],
+            heading_sources: vec![HeadingSource {
+                id: 0,
+                sigma_scale: 1.0,
+            }],
+        }),
         initial: Initial {
             heading_deg: 0.0,
             heading_sigma_deg: 180.0,
@@ -214,15 +344,11 @@ fn a_minimal_file_takes_the_documented_defaults() {
             id: 0,
             lever_arm_m: [0.0; 3],
             sigma_scale: 1.0,
+            scale_error: 0.0,
         }],
-        velocity_sources: vec![VelocitySource {
-            id: 0,
-            sigma_scale: 1.0,
-        }],
-        heading_sources: vec![HeadingSource {
-            id: 0,
-            sigma_scale: 1.0,
-        }],
+        mismatched: vec![],
+        stacking: None,
+        hinf: None,
         late: Late {
             window_s: 1.0,
             capacity: 2048,
@@ -239,6 +365,9 @@ fn a_minimal_file_takes_the_documented_defaults() {
     };
     assert_eq!(Config::from_toml_str(MINIMAL, "minimal").unwrap(), expected);
 
+    let Motion::Inertial(inertial) = expected.motion else {
+        panic!("the model is imu")
+    };
     let tables = (
         Imu::default(),
         Initial::default(),
@@ -248,7 +377,7 @@ fn a_minimal_file_takes_the_documented_defaults() {
     assert_eq!(
         tables,
         (
-            expected.imu,
+            inertial.imu,
             expected.initial,
             expected.update,
             expected.late
@@ -259,8 +388,118 @@ fn a_minimal_file_takes_the_documented_defaults() {
         (expected.health, expected.runtime)
     );
     assert_eq!(PositionSource::default(), expected.position_sources[0]);
-    assert_eq!(VelocitySource::default(), expected.velocity_sources[0]);
-    assert_eq!(HeadingSource::default(), expected.heading_sources[0]);
+    assert_eq!(VelocitySource::default(), inertial.velocity_sources[0]);
+    assert_eq!(HeadingSource::default(), inertial.heading_sources[0]);
+}
+
+#[test]
+fn a_minimal_file_of_odometry_takes_the_documented_defaults() {
+    let config = Config::from_toml_str(MINIMAL_ODOMETRY, "minimal").unwrap();
+    let rows = Rows {
+        max_gap_s: 1.0,
+        on_gap: GapPolicy::Inflate,
+        max_rotation_rad: 3.0,
+        max_translation_m: 10.0,
+        first_period_s: 0.1,
+    };
+    assert_eq!(Rows::default(), rows);
+    assert_eq!(
+        (rows.max_gap_ns(), rows.first_period_ns()),
+        (1_000_000_000, 100_000_000)
+    );
+    let noise = OdometryNoise {
+        white: IncrementNoise::Density {
+            rotation: 3e-3,
+            translation: 1e-2,
+            lateral: 1e-2,
+        },
+        rotation_per_sqrt_m: 0.0,
+        rotation_per_sqrt_rad: 0.0,
+        translation_per_sqrt_m: 0.0,
+    };
+    let expected = Config {
+        model: Model::Odometry2d,
+        estimator: Estimator::Inekf,
+        invariance: Some(Invariance::Left),
+        mismatch: Mismatch::None,
+        motion: Motion::Odometry(Odometry { rows, noise }),
+        initial: Initial {
+            level: Level::Given,
+            ..Initial::default()
+        },
+        update: Update::default(),
+        position_sources: vec![PositionSource::default()],
+        mismatched: vec![],
+        stacking: None,
+        hinf: None,
+        late: Late::default(),
+        health: Health::default(),
+        runtime: Runtime::default(),
+    };
+    assert_eq!(config, expected);
+}
+
+#[test]
+fn the_defaults_that_vary_are_as_documented() {
+    let read = |top: &str, tables: &str| {
+        Config::from_toml_str(&format!("{top}\n{MINIMAL_ODOMETRY}{tables}"), "varies")
+            .unwrap_or_else(|faults| panic!("{faults}"))
+    };
+    let scale = "[[mismatched]]\nwhat = 'odometry_scale'\n";
+    for (estimator, invariance) in [("lc-inekf", Some(Invariance::Left)), ("lc-ekf", None)] {
+        let config = read(&format!("estimator = '{estimator}'"), scale);
+        assert_eq!(
+            (config.mismatch, config.invariance),
+            (Mismatch::Hard, invariance)
+        );
+        let expected = Mismatched {
+            what: Wrong::OdometryScale,
+            sigma: f64::INFINITY,
+            burst_sigma: f64::INFINITY,
+            walk: 0.0,
+        };
+        assert_eq!(config.mismatched, [expected]);
+    }
+    for (estimator, invariance) in [("inekf", Some(Invariance::Left)), ("ekf", None)] {
+        let config = read(&format!("estimator = '{estimator}'"), "");
+        assert_eq!(
+            (config.mismatch, config.invariance),
+            (Mismatch::None, invariance)
+        );
+    }
+
+    let tables = "[[mismatched]]\nwhat = 'odometry_rotation_bias'\nsigma = 0.5\n\
+                  [[mismatched]]\nwhat = 'measurement_rotation'\nsource = 0\nsigma = 0.5\n";
+    let plane = read("mismatch = 'adaptive'", tables);
+    let space = plane_to_space(&format!(
+        "mismatch = 'adaptive'\n{MINIMAL_ODOMETRY}{tables}"
+    ));
+    for (config, axis) in [(&plane, Some(Axis::Z)), (&space, None)] {
+        let [bias, rotation] = config.mismatched[..] else {
+            panic!("{config:?}")
+        };
+        assert_eq!(bias.what, Wrong::OdometryRotationBias { axis: Axis::Z });
+        assert_eq!(bias.burst_sigma, 1.5, "three times sigma for odometry");
+        assert_eq!(
+            rotation.what,
+            Wrong::MeasurementRotation { source: 0, axis }
+        );
+        assert_eq!(rotation.burst_sigma, 0.5, "as sigma for a measurement");
+        assert_eq!(
+            rotation.what.parameters(),
+            if axis.is_some() { 1 } else { 3 }
+        );
+        assert_eq!(
+            (bias.what.source(), rotation.what.source()),
+            (None, Some(0))
+        );
+    }
+    assert_eq!((plane.error_states(), space.error_states()), (3, 6));
+}
+
+/// The same text, with the model in space.
+fn plane_to_space(text: &str) -> Config {
+    Config::from_toml_str(&text.replace("odometry2d", "odometry3d"), "in space").unwrap()
 }
 
 #[test]
@@ -286,6 +525,16 @@ fn every_file_in_the_config_folder_is_sound_and_has_one_heading() {
     }
     for name in [
         "example",
+        "example_odometry",
+        "planar_mismatch_inekf",
+        "planar_mismatch_lc-inekf",
+        "planar_mismatch_adaptive",
+        "planar_mismatch_ekf",
+        "planar_mismatch_lc-ekf",
+        "planar_mismatch_invariant-hinf",
+        "wifibot_3",
+        "plaza2_mower",
+        "husky_outdoor",
         "kitti00_car_a",
         "euroc_mh01_mav",
         "rtk_car_boulder",
@@ -323,7 +572,10 @@ fn files_for_recordings_agree_with_them() {
             .trim()
             .parse()
             .unwrap();
-        assert_eq!(config.gravity_mps2, gravity, "{name}");
+        let Motion::Inertial(inertial) = &config.motion else {
+            panic!("{name} is a recording of an IMU")
+        };
+        assert_eq!(inertial.gravity_mps2, gravity, "{name}");
         let list = after("lever_arm_flu_m").split(['[', ']']).nth(1).unwrap();
         let lever_arm: Vec<f64> = list.split(',').map(|x| x.trim().parse().unwrap()).collect();
         for (ours, theirs) in config.position_sources[0]
@@ -337,18 +589,63 @@ fn files_for_recordings_agree_with_them() {
             );
         }
 
-        let rows = fs::read_to_string(folder.join(truth)).unwrap();
-        let row: Vec<f64> = rows
-            .lines()
-            .nth(1)
-            .unwrap()
-            .split(',')
-            .map(|x| x.parse().unwrap())
-            .collect();
-        let (w, x, y, z) = (row[1], row[2], row[3], row[4]);
-        let (r00, r10) = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z));
-        let heading = r10.atan2(r00);
-        let off = (config.initial.heading_rad() - heading).abs().to_degrees();
-        assert!(off < 0.01, "{name}: heading is off by {off} deg");
+        assert_heading(name, &config, &first_row(&folder.join(truth)));
     }
+    for name in ["wifibot_3", "plaza2_mower"] {
+        let config = Config::load(service_file(&format!("config/{name}.toml"))).unwrap();
+        let row = first_row(&datasets.join(name).join("truth.csv"));
+        assert_heading(name, &config, &row);
+        let position = config.initial.position_m.unwrap();
+        for (ours, theirs) in position.iter().zip(&row[8..11]) {
+            assert!(
+                (ours - theirs).abs() < 1e-4,
+                "{name}: starts at {ours} m, recorded {theirs} m"
+            );
+        }
+    }
+    let run = fs::read_to_string(datasets.join("planar_mismatch/run00/meta.json")).unwrap();
+    let variances = run.split_once("\"Q_diag_per_step\":").unwrap().1;
+    let variances = variances.split(['[', ']']).nth(1).unwrap();
+    let variances: Vec<f64> = variances
+        .split(',')
+        .map(|x| x.trim().parse().unwrap())
+        .collect();
+    for name in [
+        "inekf",
+        "lc-inekf",
+        "adaptive",
+        "ekf",
+        "lc-ekf",
+        "invariant-hinf",
+    ] {
+        let file = format!("config/planar_mismatch_{name}.toml");
+        let config = Config::load(service_file(&file)).unwrap();
+        let Motion::Odometry(odometry) = &config.motion else {
+            panic!("{file} is about odometry")
+        };
+        let sigmas = odometry.noise.row_sigmas(0.1, 1.0, 0.1);
+        let ours = [sigmas.rotation, sigmas.translation, sigmas.lateral];
+        for (sigma, variance) in ours.iter().zip(&variances) {
+            assert!(
+                (sigma * sigma / variance - 1.0).abs() < 1e-12,
+                "{file}: {sigma}"
+            );
+        }
+    }
+}
+
+/// The numbers of the first row of a CSV file.
+fn first_row(file: &Path) -> Vec<f64> {
+    let rows = fs::read_to_string(file).unwrap();
+    let row = rows.lines().nth(1).unwrap().split(',');
+    row.map(|x| x.parse().unwrap()).collect()
+}
+
+/// Asserts that `config` starts with the heading of a row `t,qw,qx,qy,qz,...`.
+fn assert_heading(name: &str, config: &Config, row: &[f64]) {
+    let (w, x, y, z) = (row[1], row[2], row[3], row[4]);
+    let (r00, r10) = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z));
+    let heading = r10.atan2(r00);
+    let off = (config.initial.heading_rad() - heading).abs().to_degrees();
+    assert!(off < 0.01, "{name}: heading is off by {off} deg");
 }

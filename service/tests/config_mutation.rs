@@ -5,10 +5,13 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const EXAMPLE: &str = include_str!("../config/example.toml");
+const EXAMPLES: [&str; 2] = [
+    include_str!("../config/example.toml"),
+    include_str!("../config/example_odometry.toml"),
+];
 
 /// Pieces that mean something to TOML or to the schema.
-const PIECES: [&str; 40] = [
+const PIECES: [&str; 50] = [
     "\n",
     "=",
     "[",
@@ -47,6 +50,16 @@ const PIECES: [&str; 40] = [
     "id = 0",
     "model",
     "position_source = [1, {}]",
+    "[[mismatched]]",
+    "mismatched = []",
+    "what = 'measurement_rotation'",
+    "estimator = 'lc-inekf'",
+    "invariance = 'right'",
+    "model = 'odometry3d'",
+    "[stacking]",
+    "sources = [0, 0, 1]",
+    "[hinf]",
+    "source = 0",
     "\r",
     "\t",
 ];
@@ -113,8 +126,8 @@ fn mutated_examples_never_panic() {
     let mut rng = ChaCha8Rng::seed_from_u64(20_240);
     let mut sound = 0;
     let rounds = 6000;
-    for _ in 0..rounds {
-        let mut text: Vec<char> = EXAMPLE.chars().collect();
+    for round in 0..rounds {
+        let mut text: Vec<char> = EXAMPLES[round % EXAMPLES.len()].chars().collect();
         for _ in 0..rng.random_range(1..=6) {
             mutate(&mut text, &mut rng);
         }
@@ -145,6 +158,8 @@ fn hostile_texts_are_answered() {
         format!("model = \"{}\"", "x".repeat(deep)),
         format!("gravity_mps2 = {}", "9".repeat(deep)),
         "[[position_source]]\n".repeat(40_000),
+        "[[mismatched]]\n".repeat(60_000),
+        format!("[stacking]\nsources = [{}]", "0,".repeat(deep)),
         "= \n".repeat(100_000),
         many_unknown,
     ];

@@ -66,7 +66,7 @@ fn allocations(work: impl FnOnce()) -> u64 {
 /// Keeps the last estimate, as a latest-value slot does.
 struct Latest(EstimateSe23);
 
-impl Outbox for Latest {
+impl Outbox<EstimateSe23> for Latest {
     fn publish(&mut self, estimate: &EstimateSe23) {
         self.0 = *estimate;
     }

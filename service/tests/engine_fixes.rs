@@ -6,6 +6,7 @@ use common::{
     Direct, Engine, Input, PERIOD_NS, belief_bits, engine_at, feed, heading, input_of, lively_imu,
     position, settings, stamp, state_on_circle, velocity,
 };
+use inekf::filter::Gate;
 use inekf::model::ImuInput;
 use inekf_service::config::Hold;
 use inekf_shared::message::{
@@ -16,7 +17,7 @@ use inekf_shared::message::{
 fn engine(hold: Hold, state: &StateVector) -> Engine {
     let mut settings = settings();
     settings.imu.hold = hold;
-    settings.fusion.gate_by_dimension = [f64::INFINITY; 4];
+    settings.fusion.update.gate = Gate::OPEN;
     engine_at(settings, state)
 }
 
@@ -200,7 +201,7 @@ fn a_fix_at_the_stamp_of_the_set_state_corrects_it() {
 #[test]
 fn the_scale_of_a_source_widens_its_fixes() {
     let mut scaled = settings();
-    scaled.fusion.gate_by_dimension = [f64::INFINITY; 4];
+    scaled.fusion.update.gate = Gate::OPEN;
     for kind in &mut scaled.fusion.sources {
         kind[0].as_mut().unwrap().sigma_scale = 2.0;
     }

@@ -188,7 +188,7 @@ fn strange_state(k: u64, rng: &mut ChaCha8Rng) -> StateVector {
 fn feed_strange(engine: &mut Engine, kind: Kind, k: u64, rng: &mut ChaCha8Rng) {
     let outbox: &mut Vec<EstimateSe23> = &mut Vec::new();
     match kind {
-        Kind::Imu => engine.imu(&strange_imu(k, rng), rng.random(), outbox),
+        Kind::Imu => engine.sample(&strange_imu(k, rng), rng.random(), outbox),
         Kind::Position => engine.position(&strange_position(k, rng), outbox),
         Kind::Velocity => engine.velocity(&strange_velocity(k, rng), outbox),
         Kind::Heading => engine.heading(&strange_heading(k, rng), outbox),

@@ -154,7 +154,7 @@ fn a_filter_without_biases_takes_both_and_publishes_nine() {
 
     let mut rows: Vec<EstimateSe23> = Vec::new();
     for k in 0..3 {
-        engine.imu(&lively_imu(k), 0, &mut rows);
+        engine.sample(&lively_imu(k), 0, &mut rows);
     }
     assert_eq!(rows.len(), 2);
     assert_eq!(rows[1].head.dimension, 9);
@@ -174,8 +174,8 @@ fn a_right_invariant_filter_speaks_of_the_left_invariant_error() {
     assert!(close(&right.snapshot().unwrap(), &state));
     let (mut left_rows, mut right_rows): (Vec<EstimateSe23>, Vec<_>) = (Vec::new(), Vec::new());
     for k in 0..50 {
-        left.imu(&lively_imu(k), 0, &mut left_rows);
-        right.imu(&lively_imu(k), 0, &mut right_rows);
+        left.sample(&lively_imu(k), 0, &mut left_rows);
+        right.sample(&lively_imu(k), 0, &mut right_rows);
     }
     // Propagation is one and the same map in two coordinates.
     let (left, right) = (left.snapshot().unwrap(), right.snapshot().unwrap());

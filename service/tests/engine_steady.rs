@@ -77,7 +77,7 @@ fn the_same_inputs_give_the_same_bytes() {
 /// Keeps the last estimate.
 struct Latest(EstimateSe23);
 
-impl Outbox for Latest {
+impl Outbox<EstimateSe23> for Latest {
     fn publish(&mut self, estimate: &EstimateSe23) {
         self.0 = *estimate;
     }

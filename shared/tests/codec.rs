@@ -70,19 +70,21 @@ fn golden_bytes() {
         late: 0,
         lost: u64::MAX,
         rejected: 4,
+        unpaired: 5,
     };
     #[rustfmt::skip]
     let golden = [
         b'I', b'N', b'E', b'K', b'F', b'R', b'M', 0,
         1, 0, 0, 0,
         9, 0, 0, 0,
-        40, 0, 0, 0,
-        0x8c, 0x6d, 0x78, 0x09,
+        48, 0, 0, 0,
+        0x1f, 0xb2, 0xa9, 0xfb,
         1, 0, 0, 0, 0, 0, 0, 0,
         3, 2, 0, 0, 0, 0, 0, 0,
         0, 0, 0, 0, 0, 0, 0, 0,
         255, 255, 255, 255, 255, 255, 255, 255,
         4, 0, 0, 0, 0, 0, 0, 0,
+        5, 0, 0, 0, 0, 0, 0, 0,
     ];
     assert_eq!(encode(9, &counters).unwrap(), golden);
     assert_eq!(decode::<Counters>(9, &golden).unwrap(), counters);

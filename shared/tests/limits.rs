@@ -264,8 +264,8 @@ fn another_model_is_a_clear_error_with_both_types() {
         error,
         TransportError::Incompatible {
             service: "inekf/limits/estimate".to_owned(),
-            ours: "inekf.EstimateSe3.v1 (408 bytes, aligned to 8)".to_owned(),
-            theirs: "inekf.EstimateSe23.v1 (1272 bytes, aligned to 8)".to_owned(),
+            ours: "inekf.EstimateSe3.v2 (520 bytes, aligned to 8)".to_owned(),
+            theirs: "inekf.EstimateSe23.v2 (1288 bytes, aligned to 8)".to_owned(),
         }
     );
 
@@ -306,7 +306,7 @@ fn another_layout_under_the_same_name_is_a_clear_error() {
     let text = transport::control(&node, &instance())
         .unwrap_err()
         .to_string();
-    for part in ["inekf.ControlResponse.v1", "inekf.Health.v1 (272 bytes"] {
+    for part in ["inekf.ControlResponse.v2", "inekf.Health.v2 (280 bytes"] {
         assert!(text.contains(part), "{text}");
     }
 }

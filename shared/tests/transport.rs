@@ -153,6 +153,8 @@ fn the_estimate_of_every_model_passes() {
         q_wb: [0.0, 0.0, 0.0, 1.0],
         p_w_m: [1.0, 2.0, 3.0],
         covariance: [0.5; SE3_TRI],
+        mismatch: [0.1, 0.2, f64::MAX, 0.0, -0.0, -1.0],
+        mismatch_sigma: [1.0; 6],
     }]);
     estimate_passes(&[EstimateSe2 {
         head: EstimateHead {
@@ -162,6 +164,8 @@ fn the_estimate_of_every_model_passes() {
         theta_rad: 0.3,
         p_w_m: [1.0, 2.0],
         covariance: [0.5; SE2_TRI],
+        mismatch: [0.1, 0.2, f64::MAX, 0.0, -0.0, -1.0],
+        mismatch_sigma: [1.0; 6],
     }]);
 }
 
@@ -470,7 +474,7 @@ fn reserved_memory_is_backed_before_it_is_written() {
     };
     // Eight readers that each may keep a full buffer make the largest file.
     let largest = *sizes().last().unwrap();
-    assert!(largest.0 > 8 * 1024 * 1272);
+    assert!(largest.0 > 8 * 1024 * 1288);
     assert!(largest.1 < largest.0);
     let total = transport::reserve_shared_memory(&node).unwrap();
     assert!(sizes().iter().all(|(len, backed)| backed >= len));

@@ -10,15 +10,18 @@ use inekf_client::dataset::{Dataset, Initial, Meta};
 use inekf_client::feed::{Input, Numbering};
 use inekf_client::rows::{RowBuilder, state, triangle};
 use inekf_client::table::{EstimateWriter, Layout};
-use inekf_service::config::Config;
+use inekf_service::config::{Config, Motion};
 use inekf_service::engine::tally::Tally;
 use inekf_service::engine::{InertialEngine, Outbox, Settings};
 use inekf_shared::message::{EstimateSe23, MODEL_IMU, NAV_DIM, StateVector, Zero, triangle_index};
 
 /// Feeds a dataset to an engine with this configuration; every estimate goes to `outbox`.
-pub fn run(dataset: &Dataset, config: &str, outbox: &mut impl Outbox) -> Tally {
+pub fn run(dataset: &Dataset, config: &str, outbox: &mut impl Outbox<EstimateSe23>) -> Tally {
     let config = Config::from_toml_str(config, "the test's").unwrap_or_else(|e| panic!("{e}"));
-    if config.biases {
+    let Motion::Inertial(inertial) = &config.motion else {
+        panic!("the configuration is not one of the model imu");
+    };
+    if inertial.biases {
         feed::<NavState, Left, 15>(dataset, &config, outbox)
     } else {
         feed::<SE23, Left, 9>(dataset, &config, outbox)
@@ -89,7 +92,7 @@ pub fn initial_state(meta: &Meta) -> Option<StateVector> {
 fn feed<G: InertialState<D>, S: Side, const D: usize>(
     dataset: &Dataset,
     config: &Config,
-    outbox: &mut impl Outbox,
+    outbox: &mut impl Outbox<EstimateSe23>,
 ) -> Tally {
     let mut engine = InertialEngine::<G, S, D>::new(Settings::new(config));
     if let Some(state) = initial_state(&dataset.meta) {
@@ -123,7 +126,7 @@ fn feed<G: InertialState<D>, S: Side, const D: usize>(
         while let Some(fix) = heading.next_if(|fix| fix.header.stamp_ns <= now_ns) {
             engine.heading(&fix, outbox);
         }
-        engine.imu(&sample, 0, outbox);
+        engine.sample(&sample, 0, outbox);
     }
     *engine.tally()
 }

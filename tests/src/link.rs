@@ -3,6 +3,7 @@
 use inekf_client::control::Controller;
 use inekf_client::dataset::{Dataset, Event};
 use inekf_client::feed::Feeder;
+use inekf_client::model::Estimate;
 use inekf_client::read::{EstimateReader, LatestEstimate};
 use inekf_shared::message::{ControlResponse, EstimateSe23, Health};
 use inekf_shared::topic::Instance;
@@ -14,19 +15,26 @@ use crate::process::{PATIENCE, eventually};
 /// Rows in flight at most: each may give two estimates, and a reader's buffer holds 1024.
 const IN_FLIGHT: usize = 200;
 
-/// A feeder, a reader and a controller.
-pub struct Link {
+/// A feeder, a reader and a controller of a daemon whose model is that of the estimates `E`.
+pub struct Link<E: Estimate = EstimateSe23> {
     /// Sends.
     pub feeder: Feeder,
     /// Receives.
-    pub reader: EstimateReader,
+    pub reader: EstimateReader<E>,
     /// Asks.
     pub controller: Controller,
 }
 
 impl Link {
-    /// Opens them on a daemon that is ready.
+    /// Opens them on a daemon of the model `imu` that is ready.
     pub fn open(memory: &Memory, instance: &str) -> Self {
+        Self::open_model(memory, instance)
+    }
+}
+
+impl<E: Estimate> Link<E> {
+    /// Opens them on a daemon that is ready, whatever its model.
+    pub fn open_model(memory: &Memory, instance: &str) -> Self {
         let instance = self::instance(instance);
         let mut link = Self {
             feeder: Feeder::open_on(memory.node(), &instance).expect("a feeder"),
@@ -39,7 +47,7 @@ impl Link {
     }
 
     /// Feeds rows so that none is lost, and returns every estimate that came of them.
-    pub fn feed(&mut self, events: impl IntoIterator<Item = Event>) -> Vec<EstimateSe23> {
+    pub fn feed(&mut self, events: impl IntoIterator<Item = Event>) -> Vec<E> {
         let mut estimates = Vec::new();
         for (sent, event) in events.into_iter().enumerate() {
             if sent % IN_FLIGHT == IN_FLIGHT - 1 {
@@ -53,12 +61,12 @@ impl Link {
     }
 
     /// Feeds a dataset from its first row to its last, as [`Link::feed`] does.
-    pub fn feed_all(&mut self, dataset: &Dataset) -> Vec<EstimateSe23> {
+    pub fn feed_all(&mut self, dataset: &Dataset) -> Vec<E> {
         self.feed(dataset.events())
     }
 
     /// Waits until everything sent has been processed and takes the estimates; returns the answer.
-    pub fn settle(&mut self, estimates: &mut Vec<EstimateSe23>) -> ControlResponse {
+    pub fn settle(&mut self, estimates: &mut Vec<E>) -> ControlResponse {
         let answer = self.controller.barrier().expect("the daemon answers");
         while let Some(estimate) = self.reader.next_estimate().expect("it can be received") {
             estimates.push(estimate);

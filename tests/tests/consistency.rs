@@ -71,7 +71,7 @@ struct Record {
     nis: Vec<f64>,
 }
 
-impl Outbox for Record {
+impl Outbox<EstimateSe23> for Record {
     fn publish(&mut self, estimate: &EstimateSe23) {
         let head = &estimate.head;
         if head.stamp_ns < CONVERGED_S * SECOND_NS {

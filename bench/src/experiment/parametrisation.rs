@@ -15,8 +15,8 @@ use std::path::Path;
 
 use anyhow::Context;
 use inekf::filter::{
-    Belief, Covariance, GainRule, Kalman, Left, Linearised, Right, Side, Transport, UpdateError,
-    UpdateOptions, propagate, propagate_odometry, update_with,
+    Belief, Covariance, GainRule, Gate, Kalman, Left, Linearised, Right, Side, Transport,
+    UpdateError, UpdateOptions, propagate, propagate_odometry, update_with,
 };
 use inekf::lie::{LieGroup, SE2, SE23, SO3};
 use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState, PositionObservation};
@@ -165,7 +165,7 @@ fn side_by_side<G: LieGroup<D>, const D: usize>(
         } else {
             Transport::None
         },
-        gate: f64::INFINITY,
+        gate: Gate::OPEN,
     };
     let mut left = drive.start::<Left>();
     let mut right = left.to_right();

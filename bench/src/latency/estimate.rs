@@ -48,7 +48,7 @@ impl Estimate {
         let instance = private_instance("latency")?;
         let daemon = Daemon::start(&config, &instance)?;
         pin::pin(Some(daemon.id()), cpu)?;
-        let mut session = Session::open(&instance)?;
+        let mut session: Session = Session::open(&instance)?;
         let mut stamp_ns = 0;
         let fix = PositionRow {
             stamp_ns: 20 * PERIOD_NS,

@@ -7,6 +7,7 @@
 use super::{
     Dataset, HeadingRow, ImuRow, Odometry, Odometry2dRow, Odometry3dRow, PositionRow, VelocityRow,
 };
+use crate::model::Model;
 
 /// One row of any kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +48,8 @@ impl Event {
     }
 }
 
-/// Iterator over a dataset's rows in feeding order; made by [`Dataset::events`].
+/// Iterator over a dataset's rows in feeding order; made by [`Dataset::events`] and
+/// [`Dataset::events_for`].
 #[derive(Clone, Debug)]
 pub struct Events<'a> {
     position: &'a [PositionRow],
@@ -73,6 +75,24 @@ impl<'a> Events<'a> {
             imu: &dataset.imu,
             odometry2d,
             odometry3d,
+        }
+    }
+
+    /// The rows of the kinds that `model` takes.
+    pub(super) fn of_model(dataset: &'a Dataset, model: Model) -> Self {
+        let all = Self::new(dataset);
+        match model {
+            Model::Imu => Self {
+                odometry2d: &[],
+                odometry3d: &[],
+                ..all
+            },
+            Model::Odometry3d | Model::Odometry2d => Self {
+                imu: &[],
+                velocity: &[],
+                heading: &[],
+                ..all
+            },
         }
     }
 

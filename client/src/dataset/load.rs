@@ -212,9 +212,9 @@ impl Folder<'_> {
     }
 }
 
-const IMU: &str = "t_ns,gx,gy,gz,ax,ay,az";
-const ODOMETRY_2D: &str = "t_ns,dtheta,dx,dy";
-const ODOMETRY_3D: &str = "t_ns,rx,ry,rz,dx,dy,dz";
+pub(super) const IMU: &str = "t_ns,gx,gy,gz,ax,ay,az";
+pub(super) const ODOMETRY_2D: &str = "t_ns,dtheta,dx,dy";
+pub(super) const ODOMETRY_3D: &str = "t_ns,rx,ry,rz,dx,dy,dz";
 const POSITION: &str = "t_ns,x,y,z,sx,sy,sz";
 const VELOCITY: &str = "t_ns,vx,vy,vz,sx,sy,sz";
 const HEADING: &str = "t_ns,heading,sigma";

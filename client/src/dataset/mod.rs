@@ -14,6 +14,7 @@
 //! by name, others are ignored. `t_ns` is a whole number of nanoseconds of the sensor clock.
 
 mod events;
+mod fit;
 mod load;
 mod meta;
 mod rows;
@@ -23,6 +24,7 @@ use std::io;
 use std::path::PathBuf;
 
 pub use events::{Event, Events};
+pub use fit::Unfit;
 pub use load::{LoadOptions, read_truth};
 pub use meta::{ImuNoise, Initial, Meta};
 pub use rows::{
@@ -97,7 +99,8 @@ impl Dataset {
 
     /// All sensor rows in the order in which they are to be fed: by stamp, and at one stamp
     /// position (by source), then velocity, then heading, then the IMU sample, then odometry, so
-    /// that a fix is there when the sample that reaches its stamp arrives.
+    /// that a fix is there when the sample that reaches its stamp arrives. A daemon of one model
+    /// takes [`Dataset::events_for`] that model.
     pub fn events(&self) -> Events<'_> {
         Events::new(self)
     }

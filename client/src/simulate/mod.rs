@@ -6,10 +6,14 @@
 //! IMU model, sample k for the interval from k-1 to k (`hold = "backward"`), per axis:
 //! `u_k = ideal_k + b_{k-1} + density / sqrt(dt) * n`, `b_k = b_{k-1} + walk * sqrt(dt) * n`, n
 //! standard normal. Fixes carry white noise and are taken at their own stamps.
+//!
+//! Planar odometry is simulated by [`simulate_planar`].
 
+mod choice;
 mod imu;
 mod jet;
 mod options;
+mod planar;
 mod scenario;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -18,11 +22,13 @@ use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use serde_json::{Map, json};
 
+pub use choice::Simulation;
 pub use imu::{ideal_sample, left_jacobian, left_jacobian_inverse};
 pub use jet::{Jet, JetVector};
 pub use options::{
     HeadingOptions, InitialOptions, PositionOptions, SimulationOptions, VelocityOptions,
 };
+pub use planar::{PLANAR_MISMATCH, PlanarOptions, simulate_planar};
 pub use scenario::{Kinematics, Scenario, UnknownScenario};
 
 use crate::dataset::{
@@ -76,6 +82,8 @@ enum Stream {
     Velocity,
     Heading,
     Initial,
+    Odometry,
+    Mismatch,
 }
 
 /// A source of standard normal vectors.
@@ -326,11 +334,8 @@ const MAX_SAMPLES: f64 = 2e7;
 
 /// Refuses what cannot be simulated.
 fn check(options: &SimulationOptions) -> Result<(), SimulationError> {
-    let mut positive = vec![
-        ("imu_rate_hz", options.imu_rate_hz),
-        ("duration_s", options.duration_s),
-        ("truth_every", f64::from(options.truth_every)),
-    ];
+    check_length("imu_rate_hz", options.imu_rate_hz, options.duration_s)?;
+    let mut positive = vec![("truth_every", f64::from(options.truth_every))];
     let mut not_negative = vec![
         ("gravity_mps2", options.gravity_mps2),
         ("gyro_density", options.gyro_density),
@@ -355,27 +360,44 @@ fn check(options: &SimulationOptions) -> Result<(), SimulationError> {
         not_negative.push(("heading.offset_s", fix.offset_s));
         not_negative.push(("heading.sigma_rad", fix.sigma_rad));
     }
-    let refuse = |(name, value), remedy| {
-        Err(SimulationError {
-            name,
-            value,
-            remedy,
-        })
-    };
-    // Above this rate two samples would share a stamp; it refuses infinity too.
-    let fine = |value: f64| value > 0.0 && value <= 1e6;
-    if let Some(bad) = positive.into_iter().find(|(_, value)| !fine(*value)) {
-        return refuse(bad, "give a number above 0, at most 1e6");
-    }
-    let samples = options.imu_rate_hz * options.duration_s;
-    if samples > MAX_SAMPLES {
-        return refuse(
-            ("imu_rate_hz * duration_s", samples),
-            "a dataset in memory holds 2e7 samples",
-        );
+    for (name, value) in positive {
+        check_positive(name, value)?;
     }
     let bad = not_negative
         .into_iter()
         .find(|(_, value)| !(*value >= 0.0 && value.is_finite()));
-    bad.map_or(Ok(()), |bad| refuse(bad, "give a finite number, 0 or more"))
+    bad.map_or(Ok(()), |(name, value)| {
+        Err(SimulationError {
+            name,
+            value,
+            remedy: "give a finite number, 0 or more",
+        })
+    })
+}
+
+/// Refuses a rate, named `rate`, and a duration that do not make a dataset.
+fn check_length(rate: &'static str, rate_hz: f64, duration_s: f64) -> Result<(), SimulationError> {
+    check_positive(rate, rate_hz)?;
+    check_positive("duration_s", duration_s)?;
+    let samples = rate_hz * duration_s;
+    if samples > MAX_SAMPLES {
+        return Err(SimulationError {
+            name: "rate * duration_s",
+            value: samples,
+            remedy: "a dataset in memory holds 2e7 samples",
+        });
+    }
+    Ok(())
+}
+
+/// Refuses what is not above 0. Above a rate of 1e6 two samples would share a stamp; that refuses infinity too.
+fn check_positive(name: &'static str, value: f64) -> Result<(), SimulationError> {
+    if value > 0.0 && value <= 1e6 {
+        return Ok(());
+    }
+    Err(SimulationError {
+        name,
+        value,
+        remedy: "give a number above 0, at most 1e6",
+    })
 }

@@ -3,6 +3,8 @@
 mod dataset;
 mod evaluate;
 mod meta;
+mod models;
+mod planar;
 mod plot;
 mod recordings;
 mod simulate;

@@ -1,12 +1,13 @@
 //! Invariant Kalman filtering for navigation, as a plain library.
 //!
-//! No inter-process communication, no clock, no files, no allocation: states and covariances
-//! live on the stack, and every function is deterministic.
+//! No inter-process communication, no clock, no files, and every function is deterministic. Nothing
+//! allocates, states and covariances live on the stack; but a smoother owns the buffers of its trajectory.
 //!
 //! - [`lie`]: the matrix Lie groups, one file each, behind one interface;
 //! - [`model`]: group-affine dynamics driven by an IMU or by odometry, what the sensors observe, and how both
 //!   may be wrong;
-//! - [`filter`]: beliefs on groups, propagation, the one update core of every filter, gating, initialisation.
+//! - [`filter`]: beliefs on groups, propagation, the one update core of every filter, gating, initialisation;
+//! - [`smoother`]: whole trajectories by Gauss-Newton, exact where noise vanishes.
 //!
 //! # Conventions
 //!
@@ -30,3 +31,4 @@ mod columns;
 pub mod filter;
 pub mod lie;
 pub mod model;
+pub mod smoother;

@@ -3,6 +3,9 @@
 //!
 //! The recordings are found through `INEKF_DATASETS`; without it these tests say so and pass.
 
+mod common;
+
+use common::dataset::{folder, table};
 use inekf::filter::{
     Belief, Constrained, Covariance, Left, UpdateOptions, propagate_odometry, update, update_with,
 };
@@ -17,31 +20,12 @@ use std::path::{Path, PathBuf};
 
 const TOLERANCE: f64 = 1e-6;
 
-/// The rows of a CSV file as numbers, in the order of `names`; an empty cell is not a number.
-fn table<const C: usize>(path: &Path, names: [&str; C]) -> Vec<[f64; C]> {
-    let text = fs::read_to_string(path).expect("a file of the set");
-    let mut lines = text.lines();
-    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
-    let indices = names.map(|name| {
-        header
-            .iter()
-            .position(|cell| *cell == name)
-            .expect("a column")
-    });
-    let row = |line: &str| {
-        let cells: Vec<&str> = line.split(',').collect();
-        indices.map(|index| cells[index].parse().unwrap_or(f64::NAN))
-    };
-    lines.map(row).collect()
-}
-
 /// The runs of a set, or nothing if the data are not here.
 fn runs(set: &str) -> Vec<PathBuf> {
-    let Some(root) = std::env::var_os("INEKF_DATASETS") else {
-        println!("skipped: INEKF_DATASETS is not set");
+    let Some(folder) = folder(set) else {
         return Vec::new();
     };
-    let entries = fs::read_dir(Path::new(&root).join(set)).expect("the set");
+    let entries = fs::read_dir(folder).expect("the set");
     let mut runs: Vec<PathBuf> = entries.map(|entry| entry.expect("a run").path()).collect();
     runs.sort();
     assert!(!runs.is_empty(), "{set} has runs");

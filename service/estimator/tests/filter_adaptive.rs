@@ -3,16 +3,17 @@
 
 mod common;
 
+use common::section7::{Law, Run, odometry_noise, start_variances};
 use common::{assert_close, derivative_at_zero, normal, seeded};
 use inekf::filter::adaptive::mixture::merged;
 use inekf::filter::{
-    Adaptive, Belief, Covariance, Expected, Left, Mode, STANDARD_MODES, Switching, UpdateOptions,
-    Verdict, propagate_augmented, standard_modes, update,
+    Adaptive, Belief, Covariance, Expected, Gate, Left, Mode, STANDARD_MODES, Switching,
+    UpdateOptions, Verdict, propagate_augmented, standard_modes, update,
 };
 use inekf::lie::{LieGroup, SE2, SO2};
 use inekf::model::{
-    Augmented, Observation, OdometryStep, OutputMismatch, PlanarFix, PlanarPair, PointFix,
-    ProcessMismatch, Unknowns,
+    Augmented, Declared, Observation, OdometryStep, OutputMismatch, PlanarFix, PlanarPair,
+    PointFix, ProcessMismatch, Unknowns,
 };
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use rand::RngExt;
@@ -31,7 +32,7 @@ const OUTPUTS: [OutputMismatch; 2] = [
 ];
 const DT_S: f64 = 0.1;
 
-fn unknowns() -> Unknowns<'static> {
+fn unknowns() -> Unknowns {
     Unknowns::new::<2, 3>(&PROCESS, &OUTPUTS).expect("three parameters")
 }
 
@@ -252,7 +253,7 @@ fn standard_bank() -> Bank<STANDARD_MODES> {
     });
     let (modes, switching) = standard_modes(&expected, DT_S);
     let options = UpdateOptions {
-        gate: 30.0,
+        gate: Gate::at(30.0),
         ..UpdateOptions::ITERATED
     };
     Bank::new(&prior(), modes, switching, options)
@@ -303,7 +304,7 @@ fn weights_stay_a_distribution_and_what_is_refused_changes_nothing() {
 fn what_one_mode_explains_is_no_outlier() {
     let modes = [mode(0.0, 0.0, [0.0; 3]), mode(0.5, 0.0, [0.0; 3])];
     let options = UpdateOptions {
-        gate: 30.0,
+        gate: Gate::at(30.0),
         ..UpdateOptions::PLAIN
     };
     let far = prior().mean.position * 3.0;
@@ -348,5 +349,84 @@ fn a_mode_that_is_entered_draws_its_mismatches_anew() {
         &of_mismatches,
         &(Matrix3::identity() * (0.07 * 0.07)),
         1e-6,
+    );
+}
+
+/// A bank of the standard modes for the odometry's scale and these other mismatches of sigma zero, over one run of
+/// \[LC\] VII: weights, estimate of the pose, its covariance, estimate and variance of the scale.
+fn with_silent<const P: usize, const D: usize>(
+    silent: &[ProcessMismatch],
+    outputs: &[OutputMismatch],
+) -> ([f64; STANDARD_MODES], SE2, Matrix3<f64>, [f64; 2]) {
+    let soft = |mismatch: &ProcessMismatch| Declared::soft(*mismatch, 0.0);
+    let mut process = vec![Declared::soft(ProcessMismatch::OdometryScale, 0.08)];
+    process.extend(silent.iter().map(soft));
+    let outputs: Vec<_> = outputs.iter().map(|it| Declared::soft(*it, 0.0)).collect();
+    let (unknowns, sigmas) = Unknowns::declared::<2, P>(&process, &outputs).expect("room for all");
+    let (modes, switching) =
+        standard_modes(&Expected::of(&unknowns, &sigmas, &(sigmas * 3.0)), DT_S);
+    let run = Run::draw(3, Law::Bursts);
+    let prior = Belief::new(run.start, Covariance::from_variances(&start_variances()));
+    let mut bank: Adaptive<SE2, 3, P, D, STANDARD_MODES> =
+        Adaptive::new(&prior, modes, switching, UpdateOptions::ITERATED);
+    for (step, pair) in run.steps.iter().zip(&run.pairs).take(100) {
+        bank.advance(&unknowns, step, &odometry_noise());
+        assert_eq!(bank.update(&unknowns.observe(*pair)), Ok(Verdict::Accepted));
+    }
+    let estimate = bank.estimate();
+    let p = estimate.covariance.matrix();
+    for k in 1..P {
+        assert_eq!(
+            estimate.mean.parameters[k], 0.0,
+            "parameter {k} never moves"
+        );
+        assert_eq!(p.row(3 + k).amax(), 0.0, "nor is it uncertain");
+    }
+    (
+        *bank.weights(),
+        estimate.mean.pose,
+        p.fixed_view::<3, 3>(0, 0).into_owned(),
+        [estimate.mean.parameters[0], p[(3, 3)]],
+    )
+}
+
+#[test]
+fn a_mismatch_of_sigma_zero_and_a_place_left_over_change_nothing() {
+    let alone = with_silent::<1, 4>(&[], &[]);
+    assert!(
+        alone.3[0].abs() > 1e-3,
+        "the one that is declared is learned"
+    );
+    let silent = [
+        ProcessMismatch::OdometryTurnScale,
+        ProcessMismatch::OdometryRotationBias { axis: 0 },
+    ];
+    assert_eq!(with_silent::<6, 9>(&[], &[]), alone, "places left over");
+    assert_eq!(with_silent::<3, 6>(&silent, &[]), alone, "sigma zero");
+    assert_eq!(with_silent::<6, 9>(&silent, &OUTPUTS), alone, "both");
+}
+
+#[test]
+fn what_is_declared_becomes_parameters() {
+    let scale = Declared::soft(ProcessMismatch::OdometryScale, 0.1);
+    let turned = OutputMismatch::MeasurementRotation {
+        source: 0,
+        axis_w: None,
+    };
+    let turned = Declared::soft(turned, 0.02);
+    let (unknowns, sigmas) = Unknowns::declared::<3, 6>(&[scale], &[turned]).expect("four of six");
+    assert_eq!(sigmas, Tangent::from([0.1, 0.02, 0.02, 0.02, 0.0, 0.0]));
+    let burst = Tangent::from([0.3, 0.1, 0.1, 0.1, 0.0, 0.0]);
+    let expected = Expected::of(&unknowns, &sigmas, &burst);
+    assert!(expected[0].of_motion && !expected[1].of_motion && !expected[5].of_motion);
+    assert_eq!((expected[3].sigma, expected[3].burst_sigma), (0.02, 0.1));
+    assert!(
+        Unknowns::declared::<3, 3>(&[scale], &[turned]).is_none(),
+        "four, not three"
+    );
+    let unknown = Declared::hard(ProcessMismatch::OdometryTurnScale);
+    assert!(
+        Unknowns::declared::<3, 6>(&[unknown], &[]).is_none(),
+        "no state without a sigma"
     );
 }

@@ -1,5 +1,6 @@
-//! The additive error on every group: what it means, its Jacobian against a numerical one, and its change of
-//! coordinates to first order. And the EKF that the update core makes of it, against one written out densely.
+//! The additive error on every group, and the other parametrisations beside it: what each means, its Jacobians against
+//! numerical ones, and its change of coordinates to first order. And the EKF that the update core makes of the
+//! additive one, against one written out densely.
 
 mod common;
 
@@ -7,7 +8,9 @@ use common::{
     any_pose, any_rotation, any_state, assert_close, derivative_at_zero, noise_of_scale, normal,
     seeded,
 };
-use inekf::filter::{Additive, Belief, Covariance, Left, Right, Side, UpdateOptions, update};
+use inekf::filter::{
+    Additive, Belief, Covariance, Forster, Gtsam, Left, Right, Side, UpdateOptions, update,
+};
 use inekf::lie::{LieGroup, SE2, SE3, SE23, SO2, SO3, TwoFrames};
 use inekf::model::{NavState, PointFix, Pose, SpatialFix};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector2, Vector3};
@@ -22,32 +25,38 @@ fn large<G: LieGroup<D>, const D: usize>(rng: &mut ChaCha8Rng) -> SVector<f64, D
     xi
 }
 
-fn assert_definitions<G: LieGroup<D>, const D: usize>(chi: &G, rng: &mut ChaCha8Rng) {
+fn assert_definitions_of<S: Side, G: LieGroup<D>, const D: usize>(chi: &G, rng: &mut ChaCha8Rng) {
     let xi = large::<G, D>(rng);
-    let there = Additive::retract(chi, &xi);
-    assert_close(
-        "the way back",
-        &Additive::difference(chi, &there),
-        &xi,
-        1e-11,
-    );
+    let there = S::retract(chi, &xi);
+    assert_close("the way back", &S::difference(chi, &there), &xi, 1e-11);
     let numerical = derivative_at_zero(|d: &SVector<f64, D>| {
-        Additive::difference(&there, &Additive::retract(chi, &(xi + d)))
+        S::difference(&there, &S::retract(chi, &(xi + d)))
     });
+    let jacobian = S::jacobian::<G, D>(&xi);
+    assert_close("Jacobian", &jacobian, &numerical, 1e-9);
+    let by_origin =
+        derivative_at_zero(|e: &SVector<f64, D>| S::difference(&S::retract(chi, e), &there));
+    let expected = -(jacobian * by_origin);
     assert_close(
-        "Jacobian",
-        &Additive::jacobian::<G, D>(&xi),
-        &numerical,
-        1e-9,
+        "of the origin",
+        &S::origin_jacobian::<G, D>(&xi),
+        &expected,
+        1e-8,
     );
-    let change = derivative_at_zero(|xi: &SVector<f64, D>| {
-        Additive::difference(chi, &Left::retract(chi, xi))
-    });
-    assert_close("from the left", &Additive::from_left(chi), &change, 1e-9);
-    let back = derivative_at_zero(|xi: &SVector<f64, D>| {
-        Left::difference(chi, &Additive::retract(chi, xi))
-    });
-    assert_close("to the left", &Additive::to_left(chi), &back, 1e-9);
+    let change =
+        derivative_at_zero(|xi: &SVector<f64, D>| S::difference(chi, &Left::retract(chi, xi)));
+    assert_close("from the left", &S::from_left(chi), &change, 1e-9);
+    let back =
+        derivative_at_zero(|xi: &SVector<f64, D>| Left::difference(chi, &S::retract(chi, xi)));
+    assert_close("to the left", &S::to_left(chi), &back, 1e-9);
+}
+
+fn assert_definitions<G: LieGroup<D>, const D: usize>(chi: &G, rng: &mut ChaCha8Rng) {
+    assert_definitions_of::<Additive, G, D>(chi, rng);
+    assert_definitions_of::<Gtsam, G, D>(chi, rng);
+    assert_definitions_of::<Forster, G, D>(chi, rng);
+    assert_definitions_of::<Left, G, D>(chi, rng);
+    assert_definitions_of::<Right, G, D>(chi, rng);
 }
 
 fn any_two_frames(rng: &mut ChaCha8Rng) -> TwoFrames {
@@ -62,7 +71,7 @@ fn any_two_frames(rng: &mut ChaCha8Rng) -> TwoFrames {
 }
 
 #[test]
-fn the_additive_error_keeps_its_definitions_on_every_group() {
+fn every_error_keeps_its_definitions_on_every_group() {
     let mut rng = seeded(501);
     for _ in 0..20 {
         let heading = SO2::from_angle(3.0 * normal::<1, 1>(&mut rng).x);

@@ -21,8 +21,9 @@ use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, SMatrix, SVector, Vector2, Ve
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
 
-const PLANAR_PROCESS: [ProcessMismatch; 2] = [
+const PLANAR_PROCESS: [ProcessMismatch; 3] = [
     ProcessMismatch::OdometryScale,
+    ProcessMismatch::OdometryTurnScale,
     ProcessMismatch::OdometryRotationBias { axis: 0 },
 ];
 const PLANAR_OUTPUTS: [OutputMismatch; 2] = [
@@ -32,9 +33,10 @@ const PLANAR_OUTPUTS: [OutputMismatch; 2] = [
         axis_w: None,
     },
 ];
-const SPATIAL_PROCESS: [ProcessMismatch; 3] = [
+const SPATIAL_PROCESS: [ProcessMismatch; 4] = [
     ProcessMismatch::OdometryRotationBias { axis: 0 },
     ProcessMismatch::OdometryScale,
+    ProcessMismatch::OdometryTurnScale,
     ProcessMismatch::OdometryRotationBias { axis: 2 },
 ];
 const SPATIAL_OUTPUTS: [OutputMismatch; 3] = [
@@ -49,15 +51,15 @@ const SPATIAL_OUTPUTS: [OutputMismatch; 3] = [
     },
 ];
 
-type Planar = Augmented<SE2, 3, 4, 7>;
-type Spatial = Augmented<SE3, 6, 8, 14>;
+type Planar = Augmented<SE2, 3, 5, 8>;
+type Spatial = Augmented<SE3, 6, 9, 15>;
 
 fn planar(rng: &mut ChaCha8Rng) -> Planar {
     let pose = SE2 {
         rotation: SO2::from_angle(normal::<1, 1>(rng).x),
         position: 30.0 * normal::<2, 1>(rng),
     };
-    Augmented::new(pose, 0.1 * normal::<4, 1>(rng))
+    Augmented::new(pose, 0.1 * normal::<5, 1>(rng))
 }
 
 fn spatial(rng: &mut ChaCha8Rng) -> Spatial {
@@ -65,7 +67,7 @@ fn spatial(rng: &mut ChaCha8Rng) -> Spatial {
         rotation: any_rotation(rng),
         position: 30.0 * normal::<3, 1>(rng),
     };
-    Augmented::new(pose, 0.3 * normal::<8, 1>(rng))
+    Augmented::new(pose, 0.3 * normal::<9, 1>(rng))
 }
 
 fn any_fix<const N: usize>(rng: &mut ChaCha8Rng) -> PointFix<N> {
@@ -80,7 +82,7 @@ fn any_fix<const N: usize>(rng: &mut ChaCha8Rng) -> PointFix<N> {
 /// F against the derivative of the augmented step, at parameters that are not zero.
 fn assert_transition<G, const B: usize, const P: usize, const D: usize, const N: usize>(
     state: &Augmented<G, B, P, D>,
-    unknowns: &Unknowns<'_>,
+    unknowns: &Unknowns,
     step: &OdometryStep<G>,
 ) where
     G: RigidPose<B, N>,
@@ -119,8 +121,8 @@ where
 #[test]
 fn the_models_are_differentiated_where_the_parameters_are() {
     let mut rng = seeded(401);
-    let in_plane = Unknowns::new::<2, 4>(&PLANAR_PROCESS, &PLANAR_OUTPUTS).expect("four");
-    let in_space = Unknowns::new::<3, 8>(&SPATIAL_PROCESS, &SPATIAL_OUTPUTS).expect("eight");
+    let in_plane = Unknowns::new::<2, 5>(&PLANAR_PROCESS, &PLANAR_OUTPUTS).expect("five");
+    let in_space = Unknowns::new::<3, 9>(&SPATIAL_PROCESS, &SPATIAL_OUTPUTS).expect("nine");
     for _ in 0..20 {
         let state = planar(&mut rng);
         assert_transition(
@@ -129,7 +131,7 @@ fn the_models_are_differentiated_where_the_parameters_are() {
             &OdometryStep::new(&normal::<3, 1>(&mut rng), 0.1),
         );
         let pair = PlanarPair::new([any_fix(&mut rng), any_fix(&mut rng)]);
-        assert_observed::<Planar, _, 7, 4>(&state, &in_plane.observe(pair));
+        assert_observed::<Planar, _, 8, 4>(&state, &in_plane.observe(pair));
         let state = spatial(&mut rng);
         assert_transition(
             &state,
@@ -137,11 +139,11 @@ fn the_models_are_differentiated_where_the_parameters_are() {
             &OdometryStep::new(&normal::<6, 1>(&mut rng), 0.1),
         );
         let pair = SpatialPair::new([any_fix(&mut rng), any_fix(&mut rng)]);
-        assert_observed::<Spatial, _, 14, 6>(&state, &in_space.observe(pair));
+        assert_observed::<Spatial, _, 15, 6>(&state, &in_space.observe(pair));
     }
     assert!(
-        Unknowns::new::<3, 4>(&SPATIAL_PROCESS, &SPATIAL_OUTPUTS).is_none(),
-        "eight, not four"
+        Unknowns::new::<3, 8>(&SPATIAL_PROCESS, &SPATIAL_OUTPUTS).is_none(),
+        "nine, not eight"
     );
 }
 
@@ -186,9 +188,9 @@ fn the_augmented_state_is_a_group() {
     let mut rng = seeded(404);
     for _ in 0..10 {
         let (x, y) = (planar(&mut rng), planar(&mut rng));
-        assert_group::<7, Planar>(x, y, &mut rng);
+        assert_group::<8, Planar>(x, y, &mut rng);
         let (x, y) = (spatial(&mut rng), spatial(&mut rng));
-        assert_group::<14, Spatial>(x, y, &mut rng);
+        assert_group::<15, Spatial>(x, y, &mut rng);
         let mut lost = x;
         lost.parameters[3] = f64::NAN;
         assert!(!lost.is_finite());
@@ -198,7 +200,7 @@ fn the_augmented_state_is_a_group() {
 #[test]
 fn at_zero_the_columns_are_those_of_the_constraints() {
     let mut rng = seeded(402);
-    let unknowns = Unknowns::new::<3, 8>(&SPATIAL_PROCESS, &SPATIAL_OUTPUTS).expect("eight");
+    let unknowns = Unknowns::new::<3, 9>(&SPATIAL_PROCESS, &SPATIAL_OUTPUTS).expect("nine");
     for _ in 0..10 {
         let state = Spatial::new(spatial(&mut rng).pose, SVector::zeros());
         let step = OdometryStep::<SE3>::new(&normal::<6, 1>(&mut rng), 0.1);
@@ -208,7 +210,7 @@ fn at_zero_the_columns_are_those_of_the_constraints() {
             assert_close("d", &column, &mismatch.direction(&step), 1e-14);
         }
         let pair = SpatialPair::new([any_fix(&mut rng), any_fix(&mut rng)]);
-        let h = Observation::<Spatial, 14, 6>::left_jacobian(&unknowns.observe(pair), &state);
+        let h = Observation::<Spatial, 15, 6>::left_jacobian(&unknowns.observe(pair), &state);
         let mut next = 6 + SPATIAL_PROCESS.len();
         for mismatch in SPATIAL_OUTPUTS {
             for column in mismatch.columns(&pair, &state.pose).as_slice() {
@@ -216,7 +218,7 @@ fn at_zero_the_columns_are_those_of_the_constraints() {
                 next += 1;
             }
         }
-        assert_eq!(next, 14);
+        assert_eq!(next, 15);
     }
 }
 
@@ -366,11 +368,12 @@ fn one_correction_on_the_left_and_on_the_right() {
 #[test]
 fn what_is_considered_does_not_move() {
     let mut rng = seeded(403);
-    let unknowns = Unknowns::new::<2, 4>(&PLANAR_PROCESS, &PLANAR_OUTPUTS).expect("four");
+    let unknowns = Unknowns::new::<2, 5>(&PLANAR_PROCESS, &PLANAR_OUTPUTS).expect("five");
     for _ in 0..20 {
         let state = planar(&mut rng);
-        let sigmas = SVector::<f64, 7>::from_column_slice(&[0.05, 2.0, 2.0, 0.1, 0.01, 0.1, 0.05]);
-        let prior = Belief::<Planar, Left, 7>::new(state, covariance_of_scale(&sigmas, &mut rng));
+        let sigmas =
+            SVector::<f64, 8>::from_column_slice(&[0.05, 2.0, 2.0, 0.1, 0.1, 0.01, 0.1, 0.05]);
+        let prior = Belief::<Planar, Left, 8>::new(state, covariance_of_scale(&sigmas, &mut rng));
         let pair = PlanarPair::new([any_fix(&mut rng), any_fix(&mut rng)]);
         let seen = unknowns.observe(pair);
         let mut posterior = prior;
@@ -379,19 +382,19 @@ fn what_is_considered_does_not_move() {
             update_with(&mut posterior, &seen, &rule, &UpdateOptions::PLAIN).expect("an update");
         assert_eq!(posterior.mean.parameters, state.parameters);
         let (p, after) = (prior.covariance.matrix(), posterior.covariance.matrix());
-        let of_parameters = p.fixed_view::<4, 4>(3, 3).into_owned();
+        let of_parameters = p.fixed_view::<5, 5>(3, 3).into_owned();
         assert_within(
             "P_mm",
-            &after.fixed_view::<4, 4>(3, 3).into_owned(),
+            &after.fixed_view::<5, 5>(3, 3).into_owned(),
             &of_parameters,
             1e-15,
         );
-        let h = Observation::<Planar, 7, 4>::left_jacobian(&seen, &state);
-        let s = h * p * h.transpose() + Observation::<Planar, 7, 4>::noise(&seen);
+        let h = Observation::<Planar, 8, 4>::left_jacobian(&seen, &state);
+        let s = h * p * h.transpose() + Observation::<Planar, 8, 4>::noise(&seen);
         let k = (p * h.transpose() * s.try_inverse().expect("regular"))
             .fixed_rows::<3>(0)
             .into_owned();
-        let z = Observation::<Planar, 7, 4>::residual(&seen, &state);
+        let z = Observation::<Planar, 8, 4>::residual(&seen, &state);
         assert_close(
             "xi",
             &correction.xi.fixed_rows::<3>(0).into_owned(),
@@ -406,10 +409,10 @@ fn what_is_considered_does_not_move() {
             &of_pose,
             1e-12,
         );
-        let crossed = p.fixed_view::<3, 4>(0, 3) - k * h * p.fixed_view::<7, 4>(0, 3);
+        let crossed = p.fixed_view::<3, 5>(0, 3) - k * h * p.fixed_view::<8, 5>(0, 3);
         assert_close(
             "P_xm",
-            &after.fixed_view::<3, 4>(0, 3).into_owned(),
+            &after.fixed_view::<3, 5>(0, 3).into_owned(),
             &crossed,
             1e-12,
         );

@@ -7,8 +7,8 @@ use common::{
     any_rotation, assert_close, assert_within, covariance_of_scale, noise_of_scale, normal, seeded,
 };
 use inekf::filter::{
-    Additive, Belief, Constrained, Constraints, Covariance, GainRule, Kalman, Left, Linearised,
-    Right, Side, UpdateError, UpdateOptions, Verdict, propagate_odometry, update_with,
+    Additive, Belief, Constrained, Constraints, Covariance, GainRule, Gate, Kalman, Left,
+    Linearised, Right, Side, UpdateError, UpdateOptions, Verdict, propagate_odometry, update_with,
 };
 use inekf::lie::{LieGroup, SE2, SE3, SO2, SO3};
 use inekf::model::{
@@ -398,6 +398,119 @@ fn constraints_without_a_solution_are_refused() {
     let soft = [Declared::soft(ProcessMismatch::OdometryScale, 0.1)];
     let way = ProcessColumns::in_general_position::<SE2, 2>(&soft).expect("room");
     assert_eq!(check(&way, &all, &single), Ok(2));
+}
+
+/// Where the steps lead if way and turn are longer than measured by these shares.
+fn led<'a>(
+    start: SE2,
+    steps: impl Iterator<Item = &'a Vector3<f64>>,
+    [way, turn]: [f64; 2],
+) -> SE2 {
+    steps.fold(start, |chi, step| {
+        let rotation = SO2::from_angle(step.x * (1.0 + turn));
+        SE2 {
+            rotation: chi.rotation * rotation,
+            position: chi.position + chi.rotation.rotate(&(step.yz() * (1.0 + way))),
+        }
+    })
+}
+
+#[test]
+fn a_wrong_scale_of_way_and_turn_is_taken_back_whatever_the_prior() {
+    const SMALL: f64 = 1e-5;
+    let mut rng = seeded(313);
+    let declared = [
+        ProcessMismatch::OdometryScale,
+        ProcessMismatch::OdometryTurnScale,
+    ];
+    let declared = declared.map(Declared::hard);
+    for _ in 0..100 {
+        let (mut belief, _, mut pair) = any_case::<Left>(&mut rng);
+        // Well below pi, beyond which a rotation is a smaller one to the other side.
+        let steps: [Vector3<f64>; 5] = core::array::from_fn(|_| 0.5 * normal(&mut rng));
+        let mut way = ProcessColumns::new(&declared).expect("room");
+        for step in &steps {
+            way.advance(&OdometryStep::<SE2>::new(step, 0.1), &SMatrix::zeros());
+        }
+        let wrong = SMALL * normal::<2, 1>(&mut rng);
+        let truth = led(belief.mean, steps.iter(), wrong.into());
+        belief.mean = led(belief.mean, steps.iter(), [0.0; 2]);
+        for fix in &mut pair.fixes {
+            fix.position_w = fix.expected_w(&truth);
+        }
+
+        let rule = Constrained::new(&belief, &way, &[], &pair);
+        let at = linearised(&belief, &pair);
+        let constraints = rule.constraints(&at).expect("room");
+        assert_eq!(constraints.rank(), Ok(2));
+        let (delta, t) = columns(&constraints);
+        let l = dense(&rule.gain(&belief.covariance, &at).expect("solvable"));
+        assert_satisfied("way and turn", &l, &delta, &t, 1e-12);
+        let (p, h) = (dense(belief.covariance.matrix()), dense(&at.h));
+        let kept = DMatrix::identity(3, 3) - &l * &h;
+        let joseph = &kept * p * kept.transpose() + &l * dense(&at.noise) * l.transpose();
+        let joseph = SMatrix::<f64, 3, 3>::from_column_slice(joseph.as_slice());
+
+        let before = belief.mean.inverse().compose(&truth).log().norm();
+        update_with(&mut belief, &pair, &rule, &UpdateOptions::PLAIN).expect("an update");
+        let after = belief.mean.inverse().compose(&truth).log().norm();
+        assert!(after < 1e-3 * before, "{before:e} before, {after:e} after");
+        let p = belief.covariance.matrix();
+        assert_within("Joseph", p, &joseph, 1e-12 * joseph.amax());
+    }
+    let single: PlanarFix = Points::new([any_case::<Left>(&mut rng).2.fixes[0]]);
+    let way = ProcessColumns::in_general_position::<SE2, 2>(&declared).expect("room");
+    assert_eq!(Constrained::check::<SE2>(&way, &[], &single), Ok(2));
+}
+
+/// `pair` with its residuals scaled so that their normalised square, as `judged` finds it, is `nis`.
+fn with_nis<S: Side>(
+    belief: &Belief<SE2, S, 3>,
+    pair: &PlanarPair,
+    nis: f64,
+    judged: impl Fn(&PlanarPair) -> f64,
+) -> PlanarPair {
+    let factor = (nis / judged(pair)).sqrt();
+    let mut scaled = *pair;
+    for fix in &mut scaled.fixes {
+        let expected = fix.expected_w(&belief.mean);
+        fix.position_w = expected + (fix.position_w - expected) * factor;
+    }
+    scaled
+}
+
+#[test]
+fn the_gate_is_that_of_what_the_constraints_leave() {
+    let mut rng = seeded(314);
+    let outputs = [SCALE, TURNED].map(Declared::hard);
+    let options = UpdateOptions {
+        gate: Gate::of_probability(0.99),
+        ..UpdateOptions::PLAIN
+    };
+    for _ in 0..20 {
+        let (belief, step, pair) = any_case::<Left>(&mut rng);
+        let way = after(&[Declared::hard(ProcessMismatch::OdometryScale)], &step);
+        let constrained = |pair: &PlanarPair, options: &UpdateOptions| {
+            let rule = Constrained::new(&belief, &way, &outputs, pair);
+            update_with(&mut belief.clone(), pair, &rule, options).expect("an update")
+        };
+        let plain = |pair: &PlanarPair, options: &UpdateOptions| {
+            update_with(&mut belief.clone(), pair, &Kalman, options).expect("an update")
+        };
+        // Of four outputs the constraints leave one. Quantiles of 0.99 from tables, for one and for four.
+        let nis = |pair: &PlanarPair| constrained(pair, &UpdateOptions::PLAIN).nis;
+        for (target, verdict) in [(6.634, Verdict::Accepted), (6.636, Verdict::Gated)] {
+            let pair = with_nis(&belief, &pair, target, nis);
+            let judged = constrained(&pair, &options);
+            assert_eq!((judged.verdict, judged.degrees), (verdict, 1));
+        }
+        let nis = |pair: &PlanarPair| plain(pair, &UpdateOptions::PLAIN).nis;
+        for (target, verdict) in [(13.276, Verdict::Accepted), (13.278, Verdict::Gated)] {
+            let pair = with_nis(&belief, &pair, target, nis);
+            let judged = plain(&pair, &options);
+            assert_eq!((judged.verdict, judged.degrees), (verdict, 4));
+        }
+    }
 }
 
 #[test]

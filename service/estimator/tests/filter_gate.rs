@@ -1,6 +1,7 @@
 //! Chi-square against values computed to 60 digits by summation.
 
-use inekf::filter::gate::{chi_square_quantile, chi_square_survival};
+use inekf::filter::Gate;
+use inekf::filter::gate::{MAX_DEGREES, chi_square_quantile, chi_square_survival};
 
 /// Degrees of freedom, probability, quantile.
 const QUANTILES: [(usize, f64, f64); 19] = [
@@ -114,4 +115,22 @@ fn certainty_gates_nothing() {
     assert_eq!(chi_square_quantile(3, f64::NAN), f64::INFINITY);
     assert_eq!(chi_square_quantile(3, 0.0), 0.0);
     assert_eq!(chi_square_quantile(3, -1.0), 0.0);
+}
+
+#[test]
+fn a_gate_judges_by_the_degrees_of_freedom() {
+    let gate = Gate::of_probability(0.99);
+    for (degrees, probability, quantile) in QUANTILES {
+        if probability == 0.99 && degrees <= MAX_DEGREES {
+            assert!(gate.admits(quantile * (1.0 - 1e-9), degrees));
+            assert!(!gate.admits(quantile * (1.0 + 1e-9), degrees));
+        }
+    }
+    for degrees in 1..=MAX_DEGREES {
+        assert!(Gate::at(5.0).admits(5.0, degrees) && !Gate::at(5.0).admits(5.1, degrees));
+        assert!(Gate::OPEN.admits(f64::MAX, degrees));
+        assert!(Gate::of_probability(1.0).admits(f64::MAX, degrees));
+    }
+    // Where constraints leave nothing of the innovation, its square is rounding.
+    assert!(Gate::at(0.0).admits(1e-20, 0) && gate.admits(1e-20, 0));
 }

@@ -8,7 +8,8 @@ use common::{
     assert_within, noise_of_scale, normal, seeded, sigmas,
 };
 use inekf::filter::{
-    Belief, Covariance, Left, Right, Side, UpdateError, UpdateOptions, Verdict, propagate, update,
+    Belief, Covariance, Gate, Left, Right, Side, UpdateError, UpdateOptions, Verdict, propagate,
+    update,
 };
 use inekf::lie::{LieGroup, SE23, SO3};
 use inekf::model::{
@@ -305,7 +306,7 @@ fn beyond_the_gate_nothing_moves() {
     for plain in [UpdateOptions::PLAIN, UpdateOptions::ITERATED] {
         let mut belief = prior;
         let closed = UpdateOptions {
-            gate: nis * (1.0 - 1e-12),
+            gate: Gate::at(nis * (1.0 - 1e-12)),
             ..plain
         };
         let refused = update(&mut belief, &fix, &closed).expect("a verdict");
@@ -315,7 +316,10 @@ fn beyond_the_gate_nothing_moves() {
         );
         assert_eq!(refused.xi, SVector::<f64, 15>::zeros());
         assert_eq!(belief, prior);
-        let just_open = UpdateOptions { gate: nis, ..plain };
+        let just_open = UpdateOptions {
+            gate: Gate::at(nis),
+            ..plain
+        };
         let accepted = update(&mut belief, &fix, &just_open).expect("an update");
         assert_eq!((accepted.verdict, accepted.nis), (Verdict::Accepted, nis));
         assert_ne!(belief, prior);

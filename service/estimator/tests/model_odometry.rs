@@ -237,6 +237,20 @@ fn a_process_mismatch_accumulates() {
             })
         };
         assert_process::<SE3, 6, 3>(any_spatial(&mut rng), scale, spatial, &mut rng);
+        let turn = ProcessMismatch::OdometryTurnScale;
+        let planar = |increment: &Vector3<f64>, m: f64| {
+            Vector3::new(increment.x * (1.0 + m), increment.y, increment.z)
+        };
+        assert_process::<SE2, 3, 2>(any_planar(&mut rng), turn, planar, &mut rng);
+        let spatial = |increment: &SVector<f64, 6>, m: f64| {
+            // A turn beyond pi is one below, about the other axis.
+            let rotation = SO3::exp(&increment.fixed_rows::<3>(0).into_owned());
+            let mut wrong = *increment;
+            let scaled = rotation.log() * (1.0 + m);
+            wrong.fixed_rows_mut::<3>(0).copy_from(&scaled);
+            wrong
+        };
+        assert_process::<SE3, 6, 3>(any_spatial(&mut rng), turn, spatial, &mut rng);
         // A rotation gained in the body at the end of the step: Omega Exp(m dt e).
         let bias = ProcessMismatch::OdometryRotationBias { axis: 0 };
         let planar = |increment: &Vector3<f64>, m: f64| increment + Vector3::x() * (0.1 * m);
@@ -275,8 +289,32 @@ fn a_way_within_its_noise_tells_nothing() {
     columns.advance(&step(0.051), &q);
     assert_eq!(columns.active().count(), 2);
     assert!(
-        ProcessColumns::<3>::new(&[declared[0]; 5]).is_none(),
+        ProcessColumns::<3>::new(&[declared[0]; 6]).is_none(),
         "more than there is room for"
+    );
+}
+
+#[test]
+fn a_turn_within_its_noise_tells_nothing() {
+    let declared = [
+        ProcessMismatch::OdometryTurnScale,
+        ProcessMismatch::OdometryScale,
+    ];
+    let mut columns = ProcessColumns::new(&declared.map(Declared::hard)).expect("room");
+    let q = SMatrix::from_diagonal(&Vector3::new(1e-6, 1e-4, 1e-4));
+    // 10 m straight on, but for the noise of 1 mrad: the scale of the way is seen, that of the turn is not.
+    let step = |turn: f64| OdometryStep::<SE2>::new(&Vector3::new(turn, 10.0, 0.0), 0.1);
+    columns.advance(&step(0.0049), &q);
+    let kinds: Vec<_> = columns.active().map(|(it, _)| it.mismatch).collect();
+    assert_eq!(kinds, [ProcessMismatch::OdometryScale]);
+    columns.reset();
+    columns.advance(&step(-0.0051), &q);
+    assert_eq!(columns.active().count(), 2);
+    columns.advance(&step(-0.001), &q);
+    assert_eq!(
+        columns.active().count(),
+        1,
+        "after two steps 7.1 mrad count"
     );
 }
 

@@ -53,8 +53,11 @@ choice! {
     pub enum Model {
         /// Inertial navigation: attitude, velocity, position and biases from an IMU.
         Imu = "imu",
+        /// Rotation and position in space, from increments of odometry.
+        Odometry3d = "odometry3d",
+        /// Heading and position in the plane, from increments of odometry.
+        Odometry2d = "odometry2d",
     }
-    not built: "odometry3d", "odometry2d";
 }
 
 choice! {
@@ -62,8 +65,16 @@ choice! {
     pub enum Estimator {
         /// The invariant extended Kalman filter, iterated if so configured.
         Inekf = "inekf",
+        /// The invariant filter whose gain is constrained against the declared mismatches.
+        LcInekf = "lc-inekf",
+        /// The extended Kalman filter with an additive error, for comparison.
+        Ekf = "ekf",
+        /// The same with a constrained gain, for comparison.
+        LcEkf = "lc-ekf",
+        /// The invariant extended H-infinity filter, for comparison.
+        InvariantHinf = "invariant-hinf",
     }
-    not built: "lc-inekf", "ekf", "lc-ekf", "invariant-hinf", "smoother";
+    not built: "smoother";
 }
 
 choice! {
@@ -71,8 +82,75 @@ choice! {
     pub enum Invariance {
         /// `chi = chi_hat exp(xi)`: the error in body coordinates.
         Left = "left",
+        /// `chi = exp(zeta) chi_hat`: the error in world coordinates.
+        Right = "right",
     }
-    not built: "right";
+}
+
+choice! {
+    /// What the estimator does about the declared mismatches.
+    pub enum Mismatch {
+        /// The model is taken to be right.
+        None = "none",
+        /// The gain is made blind to them, whatever their size.
+        Hard = "hard",
+        /// The gain weighs them by their sigmas, anew at each update.
+        Soft = "soft",
+        /// They are unknown constants that the gain allows for and does not estimate.
+        Consider = "consider",
+        /// They are estimated as part of the state.
+        Augmented = "augmented",
+        /// They are estimated by a bank of hypotheses: absent, constant, or coming in bursts.
+        Adaptive = "adaptive",
+    }
+}
+
+choice! {
+    /// What a declared mismatch is about.
+    pub enum MismatchKind {
+        /// The translation of every row is too long or too short by one factor.
+        OdometryScale = "odometry_scale",
+        /// The rotation of every row is too large or too small by one factor.
+        OdometryTurnScale = "odometry_turn_scale",
+        /// The rotation of every row gains a constant rate about one body axis.
+        OdometryRotationBias = "odometry_rotation_bias",
+        /// A source of position sees the world enlarged by one factor.
+        MeasurementScale = "measurement_scale",
+        /// A source of position sees the world turned.
+        MeasurementRotation = "measurement_rotation",
+    }
+}
+
+choice! {
+    /// An axis of the body or of the world.
+    pub enum Axis {
+        /// Forward, or east.
+        X = "x",
+        /// Left, or north.
+        Y = "y",
+        /// Up.
+        Z = "z",
+    }
+}
+
+choice! {
+    /// What happens to a fix whose stacking partner does not come.
+    pub enum MissingPartner {
+        /// It is fused alone, with the ordinary gain.
+        Unconstrained = "unconstrained",
+        /// It is dropped and counted.
+        Skip = "skip",
+    }
+}
+
+choice! {
+    /// Which gain goes with the covariance of the H-infinity filter.
+    pub enum HinfGain {
+        /// The gain that belongs to the widened covariance.
+        Widened = "widened",
+        /// The Kalman gain of the prior; only the covariance is widened.
+        Kalman = "kalman",
+    }
 }
 
 choice! {
@@ -98,7 +176,7 @@ choice! {
 }
 
 choice! {
-    /// What happens when the IMU was silent for longer than `imu.max_gap_s`.
+    /// What happens when the IMU or the odometry was silent for longer than its `max_gap_s`.
     pub enum GapPolicy {
         /// Propagate over the gap with inflated noise.
         Inflate = "inflate",
@@ -161,6 +239,11 @@ mod tests {
         names_are_one_to_one(Model::as_str, Model::parse);
         names_are_one_to_one(Estimator::as_str, Estimator::parse);
         names_are_one_to_one(Invariance::as_str, Invariance::parse);
+        names_are_one_to_one(Mismatch::as_str, Mismatch::parse);
+        names_are_one_to_one(MismatchKind::as_str, MismatchKind::parse);
+        names_are_one_to_one(Axis::as_str, Axis::parse);
+        names_are_one_to_one(MissingPartner::as_str, MissingPartner::parse);
+        names_are_one_to_one(HinfGain::as_str, HinfGain::parse);
         names_are_one_to_one(Discretisation::as_str, Discretisation::parse);
         names_are_one_to_one(Hold::as_str, Hold::parse);
         names_are_one_to_one(GapPolicy::as_str, GapPolicy::parse);

@@ -4,8 +4,9 @@
 //! east, `atan2(R10, R00)` of the body-to-world rotation; roll and pitch complete it as `R = Rz(heading) Ry(pitch)
 //! Rx(roll)`. Standard deviations are per axis.
 
-use super::choice::Level;
+use super::choice::{Level, Model};
 use super::interval::Interval;
+use super::motion::ONLY_IMU;
 use super::section::Section;
 
 /// The initial state and its standard deviations.
@@ -25,7 +26,8 @@ pub struct Initial {
     pub level_sigma_deg: f64,
     /// How long the accelerometer is averaged over, s; used with [`Level::Accelerometer`].
     pub level_window_s: f64,
-    /// Position of the IMU in the world, m. None: from the first position fix.
+    /// Position of the body (of the IMU, with one) in the world, m; z is 0 in the plane. None: from the first
+    /// position fix.
     pub position_m: Option<[f64; 3]>,
     /// Its standard deviation, m; used when `position_m` is given.
     pub position_sigma_m: f64,
@@ -46,8 +48,12 @@ pub struct Initial {
 }
 
 impl Initial {
-    /// Reads the table; `biases` tells whether biases are part of the state.
-    pub(super) fn read(initial: &mut Section<'_, '_>, biases: bool) -> Self {
+    /// Reads the table for `model`, None if it is not known; `biases` tells whether biases are part of the state.
+    pub(super) fn read(initial: &mut Section<'_, '_>, model: Option<Model>, biases: bool) -> Self {
+        let usual_level = match model {
+            Some(Model::Odometry3d | Model::Odometry2d) => Level::Given,
+            Some(Model::Imu) | None => Level::Accelerometer,
+        };
         let turn = Interval::closed(-360.0, 360.0);
         let half_turn = Interval::closed(-180.0, 180.0);
         let quarter_turn = Interval::closed(-90.0, 90.0);
@@ -61,12 +67,17 @@ impl Initial {
         let read = Self {
             heading_deg: initial.float("heading_deg", "deg", turn, 0.0),
             heading_sigma_deg: initial.float("heading_sigma_deg", "deg", spread, 180.0),
-            level: initial.choice("level", Level::Accelerometer),
+            level: initial.varying_choice("level", usual_level),
             roll_deg: initial.float("roll_deg", "deg", half_turn, 0.0),
             pitch_deg: initial.float("pitch_deg", "deg", quarter_turn, 0.0),
             level_sigma_deg: initial.float("level_sigma_deg", "deg", spread, 5.0),
             level_window_s: initial.float("level_window_s", "s", window, 0.2),
-            position_m: initial.optional_vector3("position_m", "m", anywhere),
+            position_m: initial.optional_place(
+                "position_m",
+                "m",
+                anywhere,
+                position_lengths(model),
+            ),
             position_sigma_m: initial.float(
                 "position_sigma_m",
                 "m",
@@ -96,6 +107,7 @@ impl Initial {
             ),
             wait_for_request: initial.boolean("wait_for_request", false),
         };
+        refuse_foreign(initial, model, read.level);
         read.refuse_contradictions(initial, biases);
         read
     }
@@ -155,8 +167,43 @@ impl Initial {
     }
 }
 
+/// How many numbers a position has.
+fn position_lengths(model: Option<Model>) -> &'static [usize] {
+    match model {
+        Some(Model::Odometry2d) => &[2],
+        Some(Model::Odometry3d | Model::Imu) => &[3],
+        None => &[2, 3],
+    }
+}
+
+/// Refuses what the state of `model` does not have.
+fn refuse_foreign(initial: &mut Section<'_, '_>, model: Option<Model>, level: Level) {
+    let Some(model) = model.filter(|model| model.is_odometry()) else {
+        return;
+    };
+    if model == Model::Odometry2d {
+        let tilt = ["level", "roll_deg", "pitch_deg", "level_sigma_deg"];
+        initial.refuse_all(&tilt, "there is no tilt in the plane: remove it");
+    } else if level == Level::Accelerometer {
+        initial.refuse("level", "odometry has no accelerometer: say \"given\"");
+    }
+    initial.refuse_all(
+        &[
+            "level_window_s",
+            "velocity_mps",
+            "velocity_sigma_mps",
+            "gyro_bias_rps",
+            "gyro_bias_sigma_rps",
+            "accel_bias_mps2",
+            "accel_bias_sigma_mps2",
+        ],
+        ONLY_IMU,
+    );
+}
+
 impl Default for Initial {
+    /// With the model `imu` and its biases.
     fn default() -> Self {
-        Section::defaults(|initial| Self::read(initial, true))
+        Section::defaults(|initial| Self::read(initial, Some(Model::Imu), true))
     }
 }

@@ -27,33 +27,47 @@
 //! ```
 
 mod choice;
+mod estimator;
 mod fault;
+mod hinf;
 mod imu;
 mod initial;
 mod interval;
 mod load;
+mod mismatched;
+mod motion;
 mod noise;
+mod odometry;
 mod operation;
 mod section;
+mod solvable;
 mod sources;
+mod stacking;
 mod suggest;
 mod update;
 mod walk;
 
 pub use choice::{
-    Discretisation, Estimator, GapPolicy, Hold, Invariance, Level, Model, Transport, WaitMode,
+    Axis, Discretisation, Estimator, GapPolicy, HinfGain, Hold, Invariance, Level, Mismatch,
+    MismatchKind, MissingPartner, Model, Transport, WaitMode,
 };
 pub use fault::{ConfigFaults, Fault};
+pub use hinf::Hinf;
 pub use imu::Imu;
 pub use initial::Initial;
 pub use load::MAX_FILE_BYTES;
-pub use noise::{Noise, WhiteNoise};
+pub use mismatched::{Mismatched, Wrong};
+pub use motion::{Inertial, Motion, Odometry};
+pub use noise::{IncrementNoise, InertialNoise, OdometryNoise, RowSigmas, WhiteNoise};
+pub use odometry::Rows;
 pub use operation::{Health, Late, Runtime};
 pub use sources::{HeadingSource, PositionSource, VelocitySource};
+pub use stacking::Stacking;
 pub use update::Update;
 pub use walk::KeySpec;
 
-use interval::Interval;
+use estimator::Filter;
+use motion::{InertialTop, Tables};
 use section::Section;
 use walk::Walk;
 
@@ -64,30 +78,24 @@ pub struct Config {
     pub model: Model,
     /// Which estimator runs.
     pub estimator: Estimator,
-    /// On which side the error is invariant.
-    pub invariance: Invariance,
-    /// Whether the IMU's biases are part of the state: 15 error states with them, 9 without.
-    pub biases: bool,
-    /// How the motion is stepped over one sample.
-    pub discretisation: Discretisation,
-    /// Which interval an IMU sample speaks for.
-    pub hold: Hold,
-    /// Gravity, m/s^2, pointing down: `g_w = (0, 0, -gravity_mps2)`.
-    pub gravity_mps2: f64,
-    /// Checks on the IMU's samples.
-    pub imu: Imu,
-    /// Process noise.
-    pub noise: Noise,
+    /// On which side the error is invariant. None: it is additive, as the estimator asks for.
+    pub invariance: Option<Invariance>,
+    /// What is done about the declared mismatches.
+    pub mismatch: Mismatch,
+    /// The sensor of motion, with all that only it has: an IMU if and only if the model is [`Model::Imu`].
+    pub motion: Motion,
     /// The initial state and its standard deviations.
     pub initial: Initial,
     /// The measurement update.
     pub update: Update,
     /// The sensors of position, each with its own id.
     pub position_sources: Vec<PositionSource>,
-    /// The sensors of velocity, each with its own id.
-    pub velocity_sources: Vec<VelocitySource>,
-    /// The sensors of heading, each with its own id.
-    pub heading_sources: Vec<HeadingSource>,
+    /// The declared mismatches, in the order in which estimates report on them; none with [`Mismatch::None`].
+    pub mismatched: Vec<Mismatched>,
+    /// Two sources of position that are fused together, if any are.
+    pub stacking: Option<Stacking>,
+    /// The H-infinity filter; there if and only if it is the estimator.
+    pub hinf: Option<Hinf>,
     /// Measurements that arrive late.
     pub late: Late,
     /// When the estimate is called degraded or stale.
@@ -97,32 +105,60 @@ pub struct Config {
 }
 
 impl Config {
+    /// The dimension of the error of the estimated motion, without parameters of mismatches.
+    pub fn error_states(&self) -> usize {
+        match (&self.motion, self.model) {
+            (Motion::Inertial(inertial), _) if inertial.biases => 15,
+            (Motion::Inertial(_), _) => 9,
+            (Motion::Odometry(_), Model::Odometry2d) => 3,
+            (Motion::Odometry(_), _) => 6,
+        }
+    }
+
     fn read(root: &mut Section<'_, '_>) -> Self {
-        // The fallback is taken only where a fault has been noted: no configuration comes of it.
-        let model = root.required_choice("model").unwrap_or(Model::Imu);
-        let estimator = root.choice("estimator", Estimator::Inekf);
-        let invariance = root.choice("invariance", Invariance::Left);
-        let biases = root.boolean("biases", true);
+        // None only where a fault has been noted: then nothing is refused for the sake of the model.
+        let model: Option<Model> = root.required_choice("model");
+        let filter = Filter::read(root, model);
+        let top = InertialTop::read(root, model);
+        let tables = Tables::read(root, model);
+        let initial = root.section("initial", |initial| {
+            Initial::read(initial, model, top.biases)
+        });
+        let update = root.section("update", Update::read);
+        let position_sources = PositionSource::read_all(root, model);
+        let motion = Motion::read(root, model, top, tables);
+
+        let ids: Vec<u32> = position_sources.iter().map(|source| source.id).collect();
+        let known_ids = root.is_sound("position_source").then_some(&*ids);
+        let mismatched = Mismatched::read_all(root, model, filter, known_ids);
+        let stacking = Stacking::read_if_given(root, model, known_ids);
+        if let Some(model) = model
+            && filter.mismatch == Mismatch::Hard
+            && root.is_sound("mismatched")
+            && root.is_sound("stacking")
+            && known_ids.is_some()
+        {
+            solvable::check(
+                root,
+                model,
+                &mismatched,
+                &position_sources,
+                stacking.as_ref(),
+            );
+        }
+        let estimator = root.is_sound("estimator").then_some(filter.estimator);
         Self {
-            model,
-            estimator,
-            invariance,
-            biases,
-            discretisation: root.choice("discretisation", Discretisation::Zoh),
-            hold: root.choice("hold", Hold::Backward),
-            gravity_mps2: root.float(
-                "gravity_mps2",
-                "m/s^2",
-                Interval::closed(0.0, 30.0),
-                9.80665,
-            ),
-            imu: root.section("imu", Imu::read),
-            noise: root.required_section("noise", Noise::read),
-            initial: root.section("initial", |initial| Initial::read(initial, biases)),
-            update: root.section("update", Update::read),
-            position_sources: PositionSource::read_all(root),
-            velocity_sources: VelocitySource::read_all(root),
-            heading_sources: HeadingSource::read_all(root),
+            model: model.unwrap_or(Model::Imu),
+            estimator: filter.estimator,
+            invariance: filter.invariance,
+            mismatch: filter.mismatch,
+            motion,
+            initial,
+            update,
+            position_sources,
+            mismatched,
+            stacking,
+            hinf: Hinf::read_if_wanted(root, estimator),
             late: root.section("late", Late::read),
             health: root.section("health", Health::read),
             runtime: root.section("runtime", Runtime::read),

@@ -1,133 +1,100 @@
-//! `[noise]`: the IMU's white noise and the random walk of its biases.
-//!
-//! White noise is given either as a continuous density `n` (a sample that stands for `dt` seconds then has the
-//! standard deviation `n / sqrt(dt)`) or as the standard deviation of each sample, whatever its interval.
+//! `[noise]`: process noise, in the keys of the model; those of another model are refused.
 
-use super::interval::Interval;
+mod inertial;
+mod odometry;
+
+pub use inertial::{InertialNoise, WhiteNoise};
+pub use odometry::{IncrementNoise, OdometryNoise, RowSigmas};
+
+use super::choice::Model;
+use super::motion::{ONLY_IMU, ONLY_ODOMETRY};
 use super::section::Section;
 
-/// Process noise of inertial navigation, equal on all three axes of a sensor.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Noise {
-    /// White noise of gyroscope and accelerometer.
-    pub white: WhiteNoise,
-    /// Random walk of the gyroscope's bias, rad/s^2/sqrt(Hz).
-    pub gyro_bias_walk: f64,
-    /// Random walk of the accelerometer's bias, m/s^3/sqrt(Hz).
-    pub accel_bias_walk: f64,
+/// Whether the keys of one kind of motion belong into this file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Relevance {
+    /// They are those of the model.
+    Required,
+    /// They are those of another model.
+    Foreign,
+    /// The model is not known: what is given is checked, and nothing is asked for.
+    Unknown,
 }
 
-/// White noise of gyroscope and accelerometer, both in the same form.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum WhiteNoise {
-    /// Continuous densities.
-    Density {
-        /// Gyroscope, rad/s/sqrt(Hz).
-        gyro: f64,
-        /// Accelerometer, m/s^2/sqrt(Hz).
-        accel: f64,
-    },
-    /// Standard deviations of one sample.
-    PerSample {
-        /// Gyroscope, rad/s.
-        gyro: f64,
-        /// Accelerometer, m/s^2.
-        accel: f64,
-    },
+/// How white noise is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    /// As continuous densities.
+    Density,
+    /// As the standard deviation of each sample or row.
+    Each,
 }
 
-impl WhiteNoise {
-    /// The standard deviation of a gyroscope sample (rad/s) and of an accelerometer sample (m/s^2) that stand for
-    /// `interval_s` seconds. The interval must be positive.
-    pub fn sample_sigmas(self, interval_s: f64) -> (f64, f64) {
-        match self {
-            Self::Density { gyro, accel } => {
-                let root = interval_s.sqrt();
-                (gyro / root, accel / root)
-            }
-            Self::PerSample { gyro, accel } => (gyro, accel),
-        }
+/// Reads the table for both kinds of motion; only what belongs to `model` means anything then.
+pub(super) fn read(
+    noise: &mut Section<'_, '_>,
+    model: Option<Model>,
+) -> (InertialNoise, OdometryNoise) {
+    let (of_imu, of_odometry) = match model.map(Model::is_odometry) {
+        None => (Relevance::Unknown, Relevance::Unknown),
+        Some(false) => (Relevance::Required, Relevance::Foreign),
+        Some(true) => (Relevance::Foreign, Relevance::Required),
+    };
+    let read = (
+        InertialNoise::read(noise, of_imu),
+        OdometryNoise::read(noise, of_odometry),
+    );
+    if of_imu == Relevance::Foreign {
+        noise.refuse_all(&inertial::KEYS, ONLY_IMU);
     }
-}
-
-impl Noise {
-    pub(super) fn read(noise: &mut Section<'_, '_>) -> Self {
-        Self {
-            white: WhiteNoise::read(noise),
-            gyro_bias_walk: noise.float(
-                "gyro_bias_walk",
-                "rad/s^2/sqrt(Hz)",
-                Interval::closed(0.0, 10.0),
-                0.0,
-            ),
-            accel_bias_walk: noise.float(
-                "accel_bias_walk",
-                "m/s^3/sqrt(Hz)",
-                Interval::closed(0.0, 100.0),
-                0.0,
-            ),
-        }
+    if of_odometry == Relevance::Foreign {
+        noise.refuse_all(&odometry::KEYS, ONLY_ODOMETRY);
     }
+    read
 }
 
-impl WhiteNoise {
-    /// Exactly one of the two pairs must be given, and whole.
-    fn read(noise: &mut Section<'_, '_>) -> Self {
-        const DENSITY: [&str; 2] = ["gyro_density", "accel_density"];
-        const PER_SAMPLE: [&str; 2] = ["gyro_sigma_per_sample", "accel_sigma_per_sample"];
-        let gyro_range = Interval::closed(0.0, 10.0);
-        let accel_range = Interval::closed(0.0, 100.0);
-
-        let densities = [
-            noise.optional_float(DENSITY[0], Some("rad/s/sqrt(Hz)"), gyro_range),
-            noise.optional_float(DENSITY[1], Some("m/s^2/sqrt(Hz)"), accel_range),
-        ];
-        let sigmas = [
-            noise.optional_float(PER_SAMPLE[0], Some("rad/s"), gyro_range),
-            noise.optional_float(PER_SAMPLE[1], Some("m/s^2"), accel_range),
-        ];
-
-        let density_given = DENSITY.iter().find(|key| noise.has(key));
-        let sigma_given = PER_SAMPLE.iter().find(|key| noise.has(key));
-        match (density_given, sigma_given) {
-            (Some(density), Some(_)) => {
-                let reason =
-                    format!("contradicts {density}: give densities or sigmas per sample, not both");
-                PER_SAMPLE.iter().for_each(|key| noise.refuse(key, &reason));
-            }
-            (Some(_), None) => demand(
-                noise,
-                DENSITY,
-                "required beside the other density, but missing",
-            ),
-            (None, Some(_)) => {
-                demand(
-                    noise,
-                    PER_SAMPLE,
-                    "required beside the other sigma per sample, but missing",
-                );
-            }
-            (None, None) => demand(
-                noise,
-                DENSITY,
-                "required, but missing (or give both sigmas per sample)",
-            ),
+/// Which of two pairs of keys is given. Both, a pair without its other half and, if they are required, neither, are
+/// faults. `each` is what one sigma is for: a sample, a row.
+fn form_of(
+    noise: &mut Section<'_, '_>,
+    density: [&'static str; 2],
+    sigma: [&'static str; 2],
+    each: &str,
+    relevance: Relevance,
+) -> Form {
+    let density_given = density.iter().find(|key| noise.has(key));
+    let sigma_given = sigma.iter().find(|key| noise.has(key));
+    match (density_given, sigma_given) {
+        _ if relevance == Relevance::Foreign => {}
+        (Some(given), Some(_)) => {
+            let reason =
+                format!("contradicts {given}: give densities or sigmas per {each}, not both");
+            noise.refuse_all(&sigma, &reason);
         }
-
-        // Zeros stand where a fault has been noted: nobody gets to see them.
-        let or_zero = |values: [Option<f64>; 2]| values.map(Option::unwrap_or_default);
-        if sigma_given.is_some() {
-            let [gyro, accel] = or_zero(sigmas);
-            Self::PerSample { gyro, accel }
-        } else {
-            let [gyro, accel] = or_zero(densities);
-            Self::Density { gyro, accel }
+        (Some(_), None) => demand(
+            noise,
+            density,
+            "required beside the other density, but missing",
+        ),
+        (None, Some(_)) => {
+            let reason = format!("required beside the other sigma per {each}, but missing");
+            demand(noise, sigma, &reason);
         }
+        (None, None) if relevance == Relevance::Required => {
+            let reason = format!("required, but missing (or give both sigmas per {each})");
+            demand(noise, density, &reason);
+        }
+        (None, None) => {}
+    }
+    if sigma_given.is_some() {
+        Form::Each
+    } else {
+        Form::Density
     }
 }
 
 /// Notes each of `keys` that is missing.
-fn demand(noise: &mut Section<'_, '_>, keys: [&str; 2], reason: &str) {
+fn demand(noise: &mut Section<'_, '_>, keys: [&'static str; 2], reason: &str) {
     for key in keys {
         if !noise.has(key) {
             noise.demand(key, reason);

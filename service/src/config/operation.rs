@@ -20,7 +20,7 @@ pub struct Late {
 pub struct Health {
     /// Without an accepted fix for this long the estimate is degraded, s of sensor time.
     pub degraded_after_s: f64,
-    /// Without an IMU sample for this long the estimate is stale, s of wall clock.
+    /// Without a sample of the IMU or a row of odometry for this long the estimate is stale, s of wall clock.
     pub stale_after_s: f64,
     /// Time between two health messages, s.
     pub period_s: f64,

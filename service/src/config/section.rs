@@ -16,6 +16,9 @@ use super::interval::Interval;
 use super::suggest::nearest;
 use super::walk::{KeySpec, Place, Walk, quote};
 
+/// The default of a key that depends on other keys.
+const VARIES: &str = "varies";
+
 /// A key of the document and its value.
 type Entry<'a> = (Place, &'a DeValue<'a>);
 
@@ -98,7 +101,22 @@ impl<'w, 'a> Section<'w, 'a> {
             format!("{default:?}"),
             each_of_three(allowed),
         );
-        self.read_vector3(&spec, allowed).unwrap_or(default)
+        self.read_vector3(&spec, allowed, &[3]).unwrap_or(default)
+    }
+
+    /// A place, zero by default: as many numbers as one of `lengths` says, the rest of the three zero.
+    pub(super) fn place(
+        &mut self,
+        name: &'static str,
+        unit: &'static str,
+        allowed: Interval,
+        lengths: &[usize],
+    ) -> [f64; 3] {
+        let default = [0.0; 3];
+        let range = each_of_three_or_two(allowed);
+        let spec = self.declare(name, Some(unit), format!("{default:?}"), range);
+        self.read_vector3(&spec, allowed, lengths)
+            .unwrap_or(default)
     }
 
     /// A whole number.
@@ -114,19 +132,9 @@ impl<'w, 'a> Section<'w, 'a> {
     {
         let range = format!("{} to {}", allowed.start(), allowed.end());
         let spec = self.declare(name, unit, default.to_string(), range);
-        let Some((place, value)) = self.entry(name) else {
-            return default;
-        };
-        let DeValue::Integer(written) = value else {
-            return self
-                .mistyped(&place, "a whole number", value, &spec)
-                .unwrap_or(default);
-        };
-        let number = i128::from_str_radix(written.as_str(), written.radix()).ok();
-        match number.and_then(|number| T::try_from(number).ok()) {
-            Some(number) if allowed.contains(&number) => number,
-            _ => self.fault(&place, "out of range", &spec).unwrap_or(default),
-        }
+        self.entry(name)
+            .and_then(|(place, value)| self.whole_number(&place, value, &allowed, &spec))
+            .unwrap_or(default)
     }
 
     /// `true` or `false`.
@@ -147,6 +155,12 @@ impl<'w, 'a> Section<'w, 'a> {
         self.read_choice(&spec).unwrap_or(default)
     }
 
+    /// One of a few names, whose default depends on other keys.
+    pub(super) fn varying_choice<T: Choice>(&mut self, name: &'static str, default: T) -> T {
+        let spec = self.declare(name, None, VARIES.to_owned(), names_of::<T>());
+        self.read_choice(&spec).unwrap_or(default)
+    }
+
     // Keys without a default ---------------------------------------------------------------------------------------
 
     /// One of a few names, which the document must give. None only if a fault was noted.
@@ -156,6 +170,21 @@ impl<'w, 'a> Section<'w, 'a> {
             self.missing(&spec, "required, but missing");
         }
         self.read_choice(&spec)
+    }
+
+    /// One of a few names, which may be absent.
+    pub(super) fn optional_choice<T: Choice>(&mut self, name: &'static str) -> Option<T> {
+        let spec = self.declare(name, None, "none".to_owned(), names_of::<T>());
+        self.read_choice(&spec)
+    }
+
+    /// A number, which the document must give. None only if a fault was noted.
+    pub(super) fn required_ratio(&mut self, name: &'static str, allowed: Interval) -> Option<f64> {
+        let spec = self.declare(name, None, "required".to_owned(), allowed.to_string());
+        if !self.has(name) {
+            self.missing(&spec, "required, but missing");
+        }
+        self.read_float(&spec, allowed)
     }
 
     /// A number that may be absent.
@@ -169,15 +198,82 @@ impl<'w, 'a> Section<'w, 'a> {
         self.read_float(&spec, allowed)
     }
 
-    /// Three numbers that may be absent.
-    pub(super) fn optional_vector3(
+    /// A number that may be absent, and then depends on other keys.
+    pub(super) fn varying_float(
+        &mut self,
+        name: &'static str,
+        unit: Option<&'static str>,
+        allowed: Interval,
+    ) -> Option<f64> {
+        let spec = self.declare(name, unit, VARIES.to_owned(), allowed.to_string());
+        self.read_float(&spec, allowed)
+    }
+
+    /// A whole number that may be absent.
+    pub(super) fn optional_integer<T>(
+        &mut self,
+        name: &'static str,
+        allowed: RangeInclusive<T>,
+    ) -> Option<T>
+    where
+        T: TryFrom<i128> + PartialOrd + Display,
+    {
+        let range = format!("{} to {}", allowed.start(), allowed.end());
+        let spec = self.declare(name, None, "none".to_owned(), range);
+        let (place, value) = self.entry(name)?;
+        self.whole_number(&place, value, &allowed, &spec)
+    }
+
+    /// A place that may be absent: as many numbers as one of `lengths` says, the rest of the three zero.
+    pub(super) fn optional_place(
         &mut self,
         name: &'static str,
         unit: &'static str,
         allowed: Interval,
+        lengths: &[usize],
     ) -> Option<[f64; 3]> {
-        let spec = self.declare(name, Some(unit), "none".to_owned(), each_of_three(allowed));
-        self.read_vector3(&spec, allowed)
+        let range = each_of_three_or_two(allowed);
+        let spec = self.declare(name, Some(unit), "none".to_owned(), range);
+        self.read_vector3(&spec, allowed, lengths)
+    }
+
+    /// Two different whole numbers, which the document must give. None only if a fault was noted.
+    pub(super) fn required_pair<T>(
+        &mut self,
+        name: &'static str,
+        allowed: RangeInclusive<T>,
+    ) -> Option<[T; 2]>
+    where
+        T: TryFrom<i128> + PartialOrd + Display,
+    {
+        let range = format!(
+            "2 different whole numbers, each {} to {}",
+            allowed.start(),
+            allowed.end()
+        );
+        let spec = self.declare(name, None, "required".to_owned(), range);
+        if !self.has(name) {
+            self.missing(&spec, "required, but missing");
+        }
+        let (place, value) = self.entry(name)?;
+        let DeValue::Array(items) = value else {
+            return self.mistyped(&place, "an array of 2 whole numbers", value, &spec);
+        };
+        if items.len() != 2 {
+            let problem = format!("must have 2 numbers, has {}", items.len());
+            return self.fault(&place, &problem, &spec);
+        }
+        let [first, second] = [0, 1].map(|index| {
+            let item = items.get(index)?;
+            let place = place.item(index, item.span());
+            self.whole_number(&place, item.get_ref(), &allowed, &spec)
+        });
+        match (first?, second?) {
+            (first, second) if first == second => {
+                self.fault(&place, "must be two different numbers", &spec)
+            }
+            (first, second) => Some([first, second]),
+        }
     }
 
     // Relations between keys ---------------------------------------------------------------------------------------
@@ -187,17 +283,47 @@ impl<'w, 'a> Section<'w, 'a> {
         self.table.is_some_and(|table| table.contains_key(name))
     }
 
-    /// Whether no fault has been noted of `name`. Of a faulty key only the default is known, and what contradicts
-    /// that is no further fault.
+    /// Whether no fault has been noted of `name` or of anything within it. Of a faulty key only the default is
+    /// known, and what contradicts that is no further fault.
     pub(super) fn is_sound(&self, name: &str) -> bool {
         let path = self.path_of(name);
-        self.walk.faults.iter().all(|fault| fault.key != path)
+        let within = |rest: &str| rest.is_empty() || rest.starts_with(['.', '[']);
+        let mut faults = self.walk.faults.iter();
+        !faults.any(|fault| fault.key.strip_prefix(&*path).is_some_and(within))
     }
 
     /// Refuses `name`, if it is given, for a reason that lies in another key.
     pub(super) fn refuse(&mut self, name: &str, reason: &str) {
         if let Some((place, _)) = self.entry(name) {
             self.walk.fault(&place, reason.to_owned(), None);
+        }
+    }
+
+    /// Refuses each of `names` that is given.
+    pub(super) fn refuse_all(&mut self, names: &[&str], reason: &str) {
+        for name in names {
+            self.refuse(name, reason);
+        }
+    }
+
+    /// Notes a fault of `name`: of its value if it is given, else of its table, whose default is at fault.
+    pub(super) fn contradict(&mut self, name: &str, problem: &str) {
+        match self.entry(name) {
+            Some((place, _)) => self.walk.fault(&place, problem.to_owned(), None),
+            None => {
+                let path = self.path_of(name);
+                self.walk
+                    .absence(path, self.start, problem.to_owned(), None);
+            }
+        }
+    }
+
+    /// Refuses this whole table, if it is given, for a reason that lies elsewhere. It is then as if it were not: what
+    /// else is wrong in it does not matter.
+    pub(super) fn refuse_whole(&mut self, reason: &str) {
+        if self.table.take().is_some() {
+            let (path, reason) = (self.path.clone(), reason.to_owned());
+            self.walk.absence(path, self.start, reason, None);
         }
     }
 
@@ -293,24 +419,27 @@ impl<'w, 'a> Section<'w, 'a> {
         self.number(&place, value, allowed, spec)
     }
 
-    fn read_vector3(&mut self, spec: &KeySpec, allowed: Interval) -> Option<[f64; 3]> {
+    /// Numbers as many as one of `lengths`, at most 3; the rest of the vector is zero.
+    fn read_vector3(
+        &mut self,
+        spec: &KeySpec,
+        allowed: Interval,
+        lengths: &[usize],
+    ) -> Option<[f64; 3]> {
         let (place, value) = self.entry(spec.name)?;
+        let wanted: Vec<String> = lengths.iter().map(usize::to_string).collect();
+        let wanted = format!("{} numbers", wanted.join(" or "));
         let DeValue::Array(items) = value else {
-            return self.mistyped(&place, "an array of 3 numbers", value, spec);
+            return self.mistyped(&place, &format!("an array of {wanted}"), value, spec);
         };
-        if items.len() != 3 {
-            let problem = format!("must have 3 numbers, has {}", items.len());
+        if !lengths.contains(&items.len()) {
+            let problem = format!("must have {wanted}, has {}", items.len());
             return self.fault(&place, &problem, spec);
         }
         let mut vector = [0.0; 3];
         let mut sound = true;
         for ((index, item), slot) in items.iter().enumerate().zip(&mut vector) {
-            let path = format!("{}[{index}]", place.path);
-            let place = Place {
-                path,
-                key: item.span(),
-                value: item.span(),
-            };
+            let place = place.item(index, item.span());
             match self.number(&place, item.get_ref(), allowed, spec) {
                 Some(number) => *slot = number,
                 None => sound = false,
@@ -357,6 +486,27 @@ impl<'w, 'a> Section<'w, 'a> {
         match number {
             Some(number) if allowed.contains(number) => Some(number),
             Some(number) if !number.is_finite() => self.fault(place, "not a finite number", spec),
+            _ => self.fault(place, "out of range", spec),
+        }
+    }
+
+    /// A whole number within `allowed`.
+    fn whole_number<T>(
+        &mut self,
+        place: &Place,
+        value: &DeValue<'_>,
+        allowed: &RangeInclusive<T>,
+        spec: &KeySpec,
+    ) -> Option<T>
+    where
+        T: TryFrom<i128> + PartialOrd + Display,
+    {
+        let DeValue::Integer(written) = value else {
+            return self.mistyped(place, "a whole number", value, spec);
+        };
+        let number = i128::from_str_radix(written.as_str(), written.radix()).ok();
+        match number.and_then(|number| T::try_from(number).ok()) {
+            Some(number) if allowed.contains(&number) => Some(number),
             _ => self.fault(place, "out of range", spec),
         }
     }
@@ -411,6 +561,10 @@ fn kind_of(value: &DeValue<'_>) -> &'static str {
 
 fn each_of_three(allowed: Interval) -> String {
     format!("3 numbers, each {allowed}")
+}
+
+fn each_of_three_or_two(allowed: Interval) -> String {
+    format!("3 numbers (2 in the plane), each {allowed}")
 }
 
 fn names_of<T: Choice>() -> String {

@@ -5,7 +5,9 @@
 
 use inekf_shared::message::MAX_SOURCES;
 
+use super::choice::Model;
 use super::interval::Interval;
+use super::motion::ONLY_ODOMETRY;
 use super::section::Section;
 
 /// A sensor of position fixes, such as a GNSS receiver.
@@ -13,10 +15,12 @@ use super::section::Section;
 pub struct PositionSource {
     /// The id its fixes carry.
     pub id: u32,
-    /// From the IMU to the antenna, body FLU, m.
+    /// From the origin of the body (the IMU, with one) to the antenna, body FLU, m; z means nothing in the plane.
     pub lever_arm_m: [f64; 3],
     /// Multiplies the standard deviations of its fixes.
     pub sigma_scale: f64,
+    /// The scale error eps that it is assumed to have: it sees `(1 + eps) x + R b`. Zero with an IMU.
+    pub scale_error: f64,
 }
 
 /// A sensor of velocity in the world.
@@ -38,18 +42,32 @@ pub struct HeadingSource {
 }
 
 impl PositionSource {
-    pub(super) fn read_all(root: &mut Section<'_, '_>) -> Vec<Self> {
-        root.sources("position_source", MAX_SOURCES, Self::read, |source| {
-            source.id
-        })
+    /// Reads the tables for `model`, None if it is not known.
+    pub(super) fn read_all(root: &mut Section<'_, '_>, model: Option<Model>) -> Vec<Self> {
+        root.sources(
+            "position_source",
+            MAX_SOURCES,
+            |source| Self::read(source, model),
+            |source| source.id,
+        )
     }
 
-    fn read(source: &mut Section<'_, '_>) -> Self {
-        Self {
+    fn read(source: &mut Section<'_, '_>, model: Option<Model>) -> Self {
+        let arm = Interval::closed(-1000.0, 1000.0);
+        let arm_lengths: &[usize] = match model {
+            Some(Model::Imu | Model::Odometry3d) => &[3],
+            Some(Model::Odometry2d) | None => &[2, 3],
+        };
+        let read = Self {
             id: id(source),
-            lever_arm_m: source.vector3("lever_arm_m", "m", Interval::closed(-1000.0, 1000.0)),
+            lever_arm_m: source.place("lever_arm_m", "m", arm, arm_lengths),
             sigma_scale: sigma_scale(source),
+            scale_error: source.ratio("scale_error", Interval::closed(-0.9, 10.0), 0.0),
+        };
+        if model == Some(Model::Imu) {
+            source.refuse("scale_error", ONLY_ODOMETRY);
         }
+        read
     }
 }
 
@@ -85,7 +103,7 @@ impl HeadingSource {
 
 impl Default for PositionSource {
     fn default() -> Self {
-        Section::defaults(Self::read)
+        Section::defaults(|source| Self::read(source, None))
     }
 }
 

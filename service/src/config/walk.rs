@@ -18,7 +18,7 @@ pub struct KeySpec {
     pub name: &'static str,
     /// The unit; None for a number without one and for anything that is not a number.
     pub unit: Option<&'static str>,
-    /// The default as TOML writes it, or `required`, or `none`.
+    /// The default as TOML writes it, or `required`, or `none`, or `varies` if it depends on other keys.
     pub default: String,
     /// What the key accepts, in words.
     pub allowed: String,
@@ -33,6 +33,17 @@ pub(super) struct Place {
     pub(super) key: Range<usize>,
     /// The bytes of the value, to quote it.
     pub(super) value: Range<usize>,
+}
+
+impl Place {
+    /// The item of that index within the array that stands here.
+    pub(super) fn item(&self, index: usize, span: Range<usize>) -> Self {
+        Self {
+            path: format!("{}[{index}]", self.path),
+            key: span.clone(),
+            value: span,
+        }
+    }
 }
 
 /// The document's text and what has been found so far.

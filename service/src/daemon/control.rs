@@ -1,21 +1,16 @@
 //! Answers to control requests: reset, set state, snapshot, barrier.
 
-use inekf::filter::Side;
-use inekf::model::InertialState;
 use inekf_shared::message::{
     CONTROL_BARRIER, CONTROL_OK, CONTROL_REFUSED, CONTROL_RESET, CONTROL_SET_STATE,
     CONTROL_SNAPSHOT, ControlRequest, ControlResponse, StateVector, Zero,
 };
 
-use crate::engine::InertialEngine;
+use crate::engine::{Engine, Model};
 
 /// Does what `request` asks, and answers. Whatever its bytes are, a refusal says why.
 ///
 /// Every input that was sent before the request must have been given to `engine` already.
-pub fn answer<G: InertialState<D>, S: Side, const D: usize>(
-    engine: &mut InertialEngine<G, S, D>,
-    request: &ControlRequest,
-) -> ControlResponse {
+pub fn answer<M: Model>(engine: &mut Engine<M>, request: &ControlRequest) -> ControlResponse {
     let outcome = match request.kind {
         CONTROL_RESET => {
             engine.reset();

@@ -7,17 +7,17 @@ use iceoryx2::prelude::ipc;
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
-    EstimateHead, EstimateSe23, HeadingFix, Health, ImuSample, Odometry2d, Odometry3d, PositionFix,
-    VelocityFix, Zero,
+    EstimateHead, EstimateMessage, Header, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
+    INPUT_ODOMETRY_3D, ImuSample, Odometry2d, Odometry3d, PositionFix, VelocityFix, Zero,
 };
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{
-    self, ControlServer, InputMessage, LatestWriter, Node, Publisher, Subscriber, TransportError,
-    WakeListener,
+    self, ControlServer, InputMessage, LatestWriter, Node, PubSub, Publisher, Subscriber,
+    TransportError, WakeListener,
 };
 
 use crate::config::WaitMode;
-use crate::engine::{MAX_AHEAD_NS, Outbox};
+use crate::engine::{MAX_AHEAD_NS, Model, Outbox};
 
 /// An aiding topic, read in step with the samples: a fix that is ahead of them is held back, and
 /// those behind it stay in the queue.
@@ -60,41 +60,78 @@ impl<M: InputMessage + Copy> FixPort<M> {
     }
 }
 
-/// The input ports.
+/// The input ports of a daemon whose motion samples are S.
 #[derive(Debug)]
-pub struct Inputs {
-    /// IMU samples.
-    pub imu: Subscriber<ImuSample>,
+pub struct Inputs<S: InputMessage> {
+    /// What moves the state.
+    pub samples: Subscriber<S>,
     /// Position fixes.
     pub position: FixPort<PositionFix>,
     /// Velocity fixes.
     pub velocity: FixPort<VelocityFix>,
     /// Heading fixes.
     pub heading: FixPort<HeadingFix>,
-    /// Planar odometry: not an input of this model, received to be counted as refused.
-    pub odometry2d: Subscriber<Odometry2d>,
-    /// Spatial odometry: likewise.
-    pub odometry3d: Subscriber<Odometry3d>,
+    /// Motion samples of the other models, received to be counted as refused.
+    pub foreign: Foreign,
+}
+
+/// The motion samples that the model does not use.
+#[derive(Debug)]
+pub struct Foreign {
+    imu: Option<Subscriber<ImuSample>>,
+    odometry2d: Option<Subscriber<Odometry2d>>,
+    odometry3d: Option<Subscriber<Odometry3d>>,
+}
+
+impl Foreign {
+    /// Hands every sample that has come to `refuse`, with its `INPUT_*` index.
+    pub fn drain(&self, mut refuse: impl FnMut(usize, &Header)) {
+        drain(&self.imu, INPUT_IMU, &mut refuse);
+        drain(&self.odometry2d, INPUT_ODOMETRY_2D, &mut refuse);
+        drain(&self.odometry3d, INPUT_ODOMETRY_3D, &mut refuse);
+    }
+}
+
+fn drain<M: InputMessage>(
+    port: &Option<Subscriber<M>>,
+    input: usize,
+    refuse: &mut impl FnMut(usize, &Header),
+) {
+    let Some(port) = port else { return };
+    while let Ok(Some(sample)) = port.receive() {
+        refuse(input, sample.payload().header());
+    }
+}
+
+/// A port for a topic that is not the model's own.
+fn foreign<M: Model, S: InputMessage>(
+    topic: &PubSub<S>,
+    input: usize,
+) -> Result<Option<Subscriber<S>>, TransportError> {
+    if input == M::INPUT {
+        return Ok(None);
+    }
+    topic.subscriber().map(Some)
 }
 
 /// Slots kept loaned for estimates to come: one for the sample, one for a fix with it.
 const LOANED_AHEAD: usize = 2;
 
-type Slot = SampleMutUninit<ipc::Service, MaybeUninit<EstimateSe23>, ()>;
+type Slot<E> = SampleMutUninit<ipc::Service, MaybeUninit<E>, ()>;
 
 /// Where estimates leave: the topic, and the slot with the newest one.
 ///
 /// Loaning allocates inside iceoryx2, so it is done ahead, away from the path of a sample.
-pub struct EstimatePort {
-    publisher: Publisher<EstimateSe23>,
-    ahead: Vec<Slot>,
-    latest: LatestWriter<EstimateSe23>,
+pub struct EstimatePort<E: EstimateMessage> {
+    publisher: Publisher<E>,
+    ahead: Vec<Slot<E>>,
+    latest: LatestWriter<E>,
     /// Estimates that could not be published; the watch reports them.
     pub failures: u64,
 }
 
-impl EstimatePort {
-    fn new(publisher: Publisher<EstimateSe23>, latest: LatestWriter<EstimateSe23>) -> Self {
+impl<E: EstimateMessage> EstimatePort<E> {
+    fn new(publisher: Publisher<E>, latest: LatestWriter<E>) -> Self {
         let mut port = Self {
             publisher,
             ahead: Vec::with_capacity(LOANED_AHEAD),
@@ -116,10 +153,10 @@ impl EstimatePort {
     }
 }
 
-impl Outbox for EstimatePort {
-    fn publish(&mut self, estimate: &EstimateSe23) {
+impl<E: EstimateMessage> Outbox<E> for EstimatePort<E> {
+    fn publish(&mut self, estimate: &E) {
         let mut stamped = *estimate;
-        stamped.head.published_ns = monotonic_ns();
+        stamped.head_mut().published_ns = monotonic_ns();
         let slot = self
             .ahead
             .pop()
@@ -134,11 +171,11 @@ impl Outbox for EstimatePort {
 }
 
 /// All ports of one daemon. They live on the thread that made them.
-pub struct Ports {
+pub struct Ports<M: Model> {
     /// What comes in.
-    pub inputs: Inputs,
+    pub inputs: Inputs<M::Sample>,
     /// What goes out.
-    pub estimates: EstimatePort,
+    pub estimates: EstimatePort<M::Estimate>,
     /// Health, about once a second.
     pub health: Publisher<Health>,
     /// Requests.
@@ -148,7 +185,7 @@ pub struct Ports {
     node: Node,
 }
 
-impl Ports {
+impl<M: Model> Ports<M> {
     /// Opens every port of `instance` that waiting in this mode needs.
     ///
     /// # Errors
@@ -159,25 +196,27 @@ impl Ports {
         // First of all: there is one server per instance, so a second daemon stops here.
         let control = transport::control(&node, instance)?.server()?;
         let inputs = transport::inputs(&node, instance)?;
-        let estimates = transport::estimate::<EstimateSe23>(&node, instance)?.publisher()?;
-        let nothing_yet = EstimateSe23 {
-            head: EstimateHead::UNSTARTED,
-            ..EstimateSe23::ZERO
-        };
+        let estimates = transport::estimate::<M::Estimate>(&node, instance)?.publisher()?;
+        let mut nothing_yet = M::Estimate::ZERO;
+        *nothing_yet.head_mut() = EstimateHead::UNSTARTED;
         let latest = transport::latest(&node, instance, nothing_yet)?.writer()?;
         let wake = transport::wake(&node, instance)?;
         let wake = match wait {
             WaitMode::Event => Some(wake.listener()?),
             WaitMode::Spin => None,
         };
+        let foreign = Foreign {
+            imu: foreign::<M, _>(&inputs.imu, INPUT_IMU)?,
+            odometry2d: foreign::<M, _>(&inputs.odometry2d, INPUT_ODOMETRY_2D)?,
+            odometry3d: foreign::<M, _>(&inputs.odometry3d, INPUT_ODOMETRY_3D)?,
+        };
         let ports = Self {
             inputs: Inputs {
-                imu: inputs.imu.subscriber()?,
+                samples: transport::input::<M::Sample>(&node, instance)?.subscriber()?,
                 position: FixPort::new(inputs.position.subscriber()?),
                 velocity: FixPort::new(inputs.velocity.subscriber()?),
                 heading: FixPort::new(inputs.heading.subscriber()?),
-                odometry2d: inputs.odometry2d.subscriber()?,
-                odometry3d: inputs.odometry3d.subscriber()?,
+                foreign,
             },
             estimates: EstimatePort::new(estimates, latest),
             health: transport::health(&node, instance)?.publisher()?,

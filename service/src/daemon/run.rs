@@ -9,19 +9,16 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
 use anyhow::Context;
-use inekf::filter::Side;
-use inekf::model::InertialState;
 use inekf_shared::clock::monotonic_ns;
-use inekf_shared::message::{INPUT_IMU, INPUT_ODOMETRY_2D, INPUT_ODOMETRY_3D, REASON_WRONG_MODEL};
-
-use inekf_shared::transport::WakeListener;
+use inekf_shared::message::{EstimateMessage, REASON_WRONG_MODEL};
+use inekf_shared::transport::{InputMessage, WakeListener};
 
 use super::control::answer;
 use super::ports::{EstimatePort, Inputs, Ports};
 use super::watch::{Moment, Watch};
 use crate::config::Config;
-use crate::engine::InertialEngine;
 use crate::engine::tally::Refusal;
+use crate::engine::{Engine, Model};
 
 /// Empty looks at the inputs between two looks at the clock in spin mode.
 const SPINS_PER_LOOK: u32 = 64;
@@ -30,9 +27,9 @@ const SPINS_PER_LOOK: u32 = 64;
 ///
 /// # Errors
 /// A port that fails for good. What a sender wrote is never an error.
-pub fn run<G: InertialState<D>, S: Side, const D: usize>(
-    engine: &mut InertialEngine<G, S, D>,
-    ports: &mut Ports,
+pub fn run<M: Model>(
+    engine: &mut Engine<M>,
+    ports: &mut Ports<M>,
     config: &Config,
     stop: &AtomicBool,
 ) -> anyhow::Result<()> {
@@ -60,16 +57,16 @@ pub fn run<G: InertialState<D>, S: Side, const D: usize>(
 }
 
 /// Takes everything that has arrived and is due. Returns the number of motion samples.
-fn take_inputs<G: InertialState<D>, S: Side, const D: usize>(
-    engine: &mut InertialEngine<G, S, D>,
-    inputs: &mut Inputs,
-    outbox: &mut EstimatePort,
+fn take_inputs<M: Model>(
+    engine: &mut Engine<M>,
+    inputs: &mut Inputs<M::Sample>,
+    outbox: &mut EstimatePort<M::Estimate>,
 ) -> anyhow::Result<u32> {
     let mut samples = 0;
-    while let Some(sample) = inputs.imu.receive().context("receiving from imu")? {
+    while let Some(sample) = inputs.samples.receive().context("receiving samples")? {
         let received_ns = monotonic_ns();
-        take_fixes(engine, inputs, sample.header.stamp_ns, outbox)?;
-        engine.imu(&sample, received_ns, outbox);
+        take_fixes(engine, inputs, sample.payload().header().stamp_ns, outbox)?;
+        engine.sample(&sample, received_ns, outbox);
         samples += 1;
     }
     // Fixes that came after the samples they belong to; before the first sample none is due.
@@ -80,11 +77,11 @@ fn take_inputs<G: InertialState<D>, S: Side, const D: usize>(
 }
 
 /// Takes the fixes up to `horizon_ns`.
-fn take_fixes<G: InertialState<D>, S: Side, const D: usize>(
-    engine: &mut InertialEngine<G, S, D>,
-    inputs: &mut Inputs,
+fn take_fixes<M: Model>(
+    engine: &mut Engine<M>,
+    inputs: &mut Inputs<M::Sample>,
     horizon_ns: u64,
-    outbox: &mut EstimatePort,
+    outbox: &mut EstimatePort<M::Estimate>,
 ) -> anyhow::Result<()> {
     while let Some(fix) = inputs.position.next_until(horizon_ns)? {
         engine.position(&fix, outbox);
@@ -98,10 +95,7 @@ fn take_fixes<G: InertialState<D>, S: Side, const D: usize>(
     Ok(())
 }
 
-fn answer_requests<G: InertialState<D>, S: Side, const D: usize>(
-    engine: &mut InertialEngine<G, S, D>,
-    ports: &mut Ports,
-) -> anyhow::Result<()> {
+fn answer_requests<M: Model>(engine: &mut Engine<M>, ports: &mut Ports<M>) -> anyhow::Result<()> {
     while let Some(request) = ports.control.receive().context("receiving a request")? {
         take_inputs(engine, &mut ports.inputs, &mut ports.estimates)?;
         // A client that is gone by now has nobody to be answered.
@@ -110,27 +104,19 @@ fn answer_requests<G: InertialState<D>, S: Side, const D: usize>(
     Ok(())
 }
 
-/// Publishes health, and counts what no other loop looks at: odometry is not of this model.
-fn report<G: InertialState<D>, S: Side, const D: usize>(
-    engine: &mut InertialEngine<G, S, D>,
-    ports: &mut Ports,
-    watch: &mut Watch,
-    now_ns: u64,
-) {
-    let inputs = &ports.inputs;
-    while let Ok(Some(row)) = inputs.odometry2d.receive() {
-        engine.refuse(INPUT_ODOMETRY_2D, &row.header, Refusal(REASON_WRONG_MODEL));
-    }
-    while let Ok(Some(row)) = inputs.odometry3d.receive() {
-        engine.refuse(INPUT_ODOMETRY_3D, &row.header, Refusal(REASON_WRONG_MODEL));
-    }
+/// Publishes health, and counts what no other loop looks at: the samples of other models.
+fn report<M: Model>(engine: &mut Engine<M>, ports: &mut Ports<M>, watch: &mut Watch, now_ns: u64) {
+    ports.inputs.foreign.drain(|input, header| {
+        engine.refuse(input, header, Refusal(REASON_WRONG_MODEL));
+    });
     let moment = Moment {
         now_ns,
+        model: M::Estimate::MODEL,
         state: engine.state(),
         last_sample_ns: engine.last_sample_ns().unwrap_or(0),
         failures: ports.estimates.failures,
     };
-    let arrivals = engine.tally().received[INPUT_IMU];
+    let arrivals = engine.tally().received[M::INPUT];
     let health = watch.report(&moment, arrivals, engine.tally());
     if let Ok(sample) = ports.health.loan_uninit() {
         // Nobody has to listen.

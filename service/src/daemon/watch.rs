@@ -3,7 +3,7 @@
 //! Everything here runs once per period, never between a sample and its estimate.
 
 use inekf_shared::message::{
-    Health, MODEL_IMU, STATE_DEGRADED, STATE_RUNNING, STATE_STALE, state_name, waiting_for_name,
+    Health, STATE_DEGRADED, STATE_RUNNING, STATE_STALE, state_name, waiting_for_name,
 };
 use tracing::{info, warn};
 
@@ -14,6 +14,8 @@ use crate::engine::tally::Tally;
 pub struct Moment {
     /// CLOCK_MONOTONIC, nanoseconds.
     pub now_ns: u64,
+    /// `MODEL_*` code.
+    pub model: u32,
     /// `STATE_*` and `WAITING_FOR_*` of the engine.
     pub state: (u32, u32),
     /// Stamp of the last accepted sample, nanoseconds of the sensor clock.
@@ -79,7 +81,7 @@ impl Watch {
             instance_pid: u64::from(std::process::id()),
             state,
             waiting_for,
-            model: MODEL_IMU,
+            model: moment.model,
             flags: 0,
             last_imu_stamp_ns: moment.last_sample_ns,
             imu_rate_hz,

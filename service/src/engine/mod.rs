@@ -4,23 +4,34 @@
 //! The same inputs in the same order give the same bytes. After construction it does not allocate,
 //! lock, log or call the system.
 //!
+//! - [`driver`]: time, order, restarts; [`model`]: what it needs of a model; [`inertial`]: the model `imu`;
+//!   [`odometry`]: the models `odometry2d` and `odometry3d`; [`mod@build`]: from a configuration to one of them
 //! - [`intake`]: checks; [`tally`]: counters; [`time_base`]: jumps of the clock
-//! - [`levelling`], [`set_state`]: the first belief
-//! - [`timeline`]: samples, fixes at their own stamps, late ones by replay; [`recovery`]: out of a lock-out
+//! - [`levelling`], [`set_state`]: the first state
+//! - [`timeline`]: samples, fixes at their own stamps, late ones by replay; [`stack`]: fixes taken together;
+//!   [`recovery`]: out of a lock-out
 //! - [`output`]: the messages
 
+pub mod build;
+pub mod driver;
 pub mod fix;
 pub mod inertial;
 pub mod intake;
 pub mod levelling;
+pub mod model;
+pub mod odometry;
 pub mod output;
 pub mod recovery;
 pub mod set_state;
 pub mod settings;
+pub mod stack;
 pub mod tally;
 pub mod time_base;
 pub mod timeline;
 
-pub use inertial::{InertialEngine, MAX_AHEAD_NS};
+pub use build::{Use, build};
+pub use driver::{Engine, MAX_AHEAD_NS};
+pub use inertial::{Inertial, InertialEngine};
+pub use model::Model;
 pub use output::Outbox;
 pub use settings::Settings;

@@ -1,37 +1,38 @@
 //! From beliefs to messages: what is published, with its stamps, flags and counters.
 
-use inekf::filter::{Belief, Side, Verdict};
-use inekf::model::InertialState;
+use inekf::filter::{Covariance, Verdict};
 use inekf_shared::message::{
     ESTIMATE_DEGRADED, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED, ESTIMATE_RESET, ESTIMATE_UPDATED,
-    EstimateHead, EstimateSe23, MODEL_IMU, NO_SOURCE, REASON_INTERNAL, STATE_DEGRADED,
-    STATE_RUNNING, StateVector, Zero,
+    EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL, STATE_DEGRADED, STATE_RUNNING,
 };
 use nalgebra::Vector3;
 
-use super::fix::FixKind;
+use super::fix::{Fix, FixKind, Measurement};
+use super::model::{Fused, Model};
 use super::tally::{Refusal, Tally};
 use super::timeline::Event;
 
 /// Where estimates go. The daemon's publishes them; a test's collects them.
-pub trait Outbox {
+pub trait Outbox<E> {
     /// Takes one estimate. Must neither block nor allocate in the daemon.
-    fn publish(&mut self, estimate: &EstimateSe23);
+    fn publish(&mut self, estimate: &E);
 }
 
-impl Outbox for Vec<EstimateSe23> {
-    fn publish(&mut self, estimate: &EstimateSe23) {
+impl<E: Copy> Outbox<E> for Vec<E> {
+    fn publish(&mut self, estimate: &E) {
         self.push(*estimate);
     }
 }
 
 /// Everything that is said about the estimate beside the estimate itself.
 #[derive(Debug)]
-pub struct Output {
+pub struct Output<E> {
     /// The counters.
     pub tally: Tally,
     /// The message under construction; its head carries what lasts from one to the next.
-    message: EstimateSe23,
+    message: E,
+    /// Where the body was in the last message, or is at the start.
+    place_w: Vector3<f64>,
     degraded_after_ns: u64,
     /// Stamp of the last accepted fix, or of the start.
     last_aided_ns: u64,
@@ -40,15 +41,15 @@ pub struct Output {
     announce_reset: bool,
 }
 
-impl Output {
+impl<E: EstimateMessage> Output<E> {
     /// Nothing published yet.
     pub fn new(degraded_after_ns: u64) -> Self {
+        let mut message = E::ZERO;
+        *message.head_mut() = EstimateHead::UNSTARTED;
         Self {
             tally: Tally::default(),
-            message: EstimateSe23 {
-                head: EstimateHead::UNSTARTED,
-                ..EstimateSe23::ZERO
-            },
+            message,
+            place_w: Vector3::zeros(),
             degraded_after_ns,
             last_aided_ns: 0,
             has_started: false,
@@ -58,22 +59,21 @@ impl Output {
 
     /// The sample that the next estimates answer.
     pub fn answer(&mut self, seq: u64, sent_ns: u64, received_ns: u64) {
-        let head = &mut self.message.head;
+        let head = self.message.head_mut();
         (head.seq, head.sent_ns, head.received_ns) = (seq, sent_ns, received_ns);
     }
 
-    /// Notes that the state was set to `position_w` at `stamp_ns`.
-    pub fn started(&mut self, stamp_ns: u64, position_w: &Vector3<f64>) {
+    /// Notes that the state was set to `place_w` at `stamp_ns`.
+    pub fn started(&mut self, stamp_ns: u64, place_w: &Vector3<f64>) {
         if self.has_started {
-            let before_w = Vector3::from(self.message.p_w_m);
-            let head = &mut self.message.head;
+            let head = self.message.head_mut();
             head.reset_count += 1;
-            head.reset_jump_m = (position_w - before_w).norm();
+            head.reset_jump_m = (place_w - self.place_w).norm();
             self.announce_reset = true;
         }
         self.has_started = true;
         self.last_aided_ns = stamp_ns;
-        self.message.p_w_m = (*position_w).into();
+        self.place_w = *place_w;
     }
 
     /// `STATE_RUNNING` or `STATE_DEGRADED` at `stamp_ns`.
@@ -86,54 +86,65 @@ impl Output {
     }
 
     /// Counts and publishes what happened on the timeline.
-    pub fn record<G: InertialState<D>, S: Side, const D: usize>(
+    pub fn record<M: Model<Estimate = E>>(
         &mut self,
-        event: &Event<'_, G, S, D>,
-        outbox: &mut impl Outbox,
+        model: &M,
+        event: &Event<'_, M::State, M::Measurement>,
+        outbox: &mut impl Outbox<E>,
     ) {
         match event {
-            Event::Propagated { stamp_ns, belief } => {
-                self.publish(*stamp_ns, belief, ESTIMATE_PROPAGATED, NO_SOURCE, outbox);
+            Event::Propagated { stamp_ns, state } => {
+                let flags = ESTIMATE_PROPAGATED;
+                self.publish(model, *stamp_ns, state, flags, NO_SOURCE, outbox);
             }
             Event::Judged {
                 stamp_ns,
-                belief,
+                state,
                 fix,
                 outcome,
                 replayed,
             } => {
-                let Ok(correction) = outcome else {
+                let Ok(fused) = outcome else {
                     self.tally.refuse(Refusal(REASON_INTERNAL));
                     return;
                 };
-                if fix.kind() == FixKind::Position
-                    && let Some(nis) = self.message.head.nis.get_mut(fix.source as usize)
-                {
-                    *nis = correction.nis;
-                }
-                if correction.verdict == Verdict::Gated {
-                    self.tally.counters.gated += 1;
+                self.note_nis(fix, fused);
+                if fused.verdict == Verdict::Gated {
+                    self.tally.counters.gated += fix.count();
                     return;
                 }
-                self.tally.counters.accepted += 1;
+                self.tally.counters.accepted += fix.count();
                 self.last_aided_ns = self.last_aided_ns.max(fix.stamp_ns);
                 let flags = if *replayed {
                     ESTIMATE_UPDATED | ESTIMATE_REPLAYED
                 } else {
                     ESTIMATE_UPDATED
                 };
-                self.publish(*stamp_ns, belief, flags, fix.source, outbox);
+                self.publish(model, *stamp_ns, state, flags, fix.source, outbox);
             }
         }
     }
 
-    fn publish<G: InertialState<D>, S: Side, const D: usize>(
+    /// The NIS of a position fix, under each of its sources.
+    fn note_nis<Z: Measurement>(&mut self, fix: &Fix<Z>, fused: &Fused) {
+        if fix.kind() != FixKind::Position {
+            return;
+        }
+        for source in [Some(fix.source), fix.partner].into_iter().flatten() {
+            if let Some(nis) = self.message.head_mut().nis.get_mut(source as usize) {
+                *nis = fused.nis;
+            }
+        }
+    }
+
+    fn publish<M: Model<Estimate = E>>(
         &mut self,
+        model: &M,
         stamp_ns: u64,
-        belief: &Belief<G, S, D>,
+        of: &M::State,
         mut flags: u32,
         source: u32,
-        outbox: &mut impl Outbox,
+        outbox: &mut impl Outbox<E>,
     ) {
         let state = self.running_state(stamp_ns);
         if state == STATE_DEGRADED {
@@ -142,54 +153,20 @@ impl Output {
         if core::mem::take(&mut self.announce_reset) {
             flags |= ESTIMATE_RESET;
         }
-        let message = &mut self.message;
-        let head = &mut message.head;
+        self.place_w = model.place_w(of);
+        model.write(of, &mut self.message);
+        let head = self.message.head_mut();
         head.stamp_ns = stamp_ns;
         head.estimate_seq += 1;
         (head.flags, head.state, head.source) = (flags, state, source);
-        head.dimension = D as u32;
         head.counters = self.tally.counters;
-        let pose = belief.mean.pose();
-        message.q_wb = pose.rotation.quaternion_xyzw();
-        message.v_w_mps = pose.velocity.into();
-        message.p_w_m = pose.position.into();
-        message.gyro_bias_rps = belief.mean.gyro_bias().into();
-        message.accel_bias_mps2 = belief.mean.accel_bias().into();
-        write_triangle(&mut message.covariance, belief);
-        outbox.publish(message);
+        outbox.publish(&self.message);
     }
 }
 
-/// Writes the upper triangle of the left-invariant covariance to the front of `triangle`.
-fn write_triangle<G: InertialState<D>, S: Side, const D: usize>(
-    triangle: &mut [f64],
-    belief: &Belief<G, S, D>,
-) {
-    for (slot, entry) in triangle
-        .iter_mut()
-        .zip(belief.left_covariance().upper_triangle())
-    {
+/// Writes the upper triangle of `covariance` to the front of `triangle`.
+pub fn write_triangle<const D: usize>(triangle: &mut [f64], covariance: &Covariance<D>) {
+    for (slot, entry) in triangle.iter_mut().zip(covariance.upper_triangle()) {
         *slot = entry;
     }
-}
-
-/// The belief as a snapshot answers it.
-pub fn state_vector<G: InertialState<D>, S: Side, const D: usize>(
-    stamp_ns: u64,
-    belief: &Belief<G, S, D>,
-) -> StateVector {
-    let pose = belief.mean.pose();
-    let mut state = StateVector {
-        model: MODEL_IMU,
-        dimension: D as u32,
-        stamp_ns,
-        q_wb: pose.rotation.quaternion_xyzw(),
-        v_w_mps: pose.velocity.into(),
-        p_w_m: pose.position.into(),
-        gyro_bias_rps: belief.mean.gyro_bias().into(),
-        accel_bias_mps2: belief.mean.accel_bias().into(),
-        ..StateVector::ZERO
-    };
-    write_triangle(&mut state.covariance, belief);
-    state
 }

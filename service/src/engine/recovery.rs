@@ -4,11 +4,6 @@
 //! as the fix contradicts it; everything else only by a little more each time. Widening all of it
 //! alike would let a jump of the position turn the attitude over through their correlation.
 
-use inekf::filter::{Belief, Correction, Covariance, Side, UpdateError, UpdateOptions};
-use inekf::model::{InertialState, Observation};
-
-use super::fix::{Fix, Measurement};
-
 /// Most that the whole covariance is scaled by: twice the standard deviations.
 const MAX_SCALE: f64 = 4.0;
 /// Most variance that is added, as a multiple of the fix's own: with more, the update that takes
@@ -25,68 +20,13 @@ pub struct Widening {
 }
 
 impl Widening {
-    /// The widening that brings `fix`, whose normalised innovation squared is `nis`, within what
-    /// `mean` may be expected to be wrong by.
-    pub fn new<G: InertialState<D>, const D: usize>(fix: &Fix, mean: &G, nis: f64) -> Self {
-        let (squared, noise) = match &fix.measurement {
-            Measurement::Position(observation) => (
-                observation.residual(mean).norm_squared(),
-                observation.covariance_w.trace(),
-            ),
-            Measurement::Velocity(observation) => (
-                observation.residual(mean).norm_squared(),
-                observation.covariance_w.trace(),
-            ),
-            Measurement::Heading(observation) => (
-                observation.residual(mean).norm_squared(),
-                observation.sigma * observation.sigma,
-            ),
-        };
-        let dimension = fix.dimension() as f64;
+    /// The widening for a fix of `dimension` whose residual has the square `squared` and whose noise the trace
+    /// `noise`, both in the square of its unit, and whose normalised innovation squared is `nis`.
+    pub fn new(squared: f64, noise: f64, dimension: usize, nis: f64) -> Self {
+        let dimension = dimension as f64;
         Self {
             scale: (nis / dimension).clamp(1.0, MAX_SCALE),
             variance: squared.min(MAX_RATIO * noise) / dimension,
         }
-    }
-
-    /// Fuses `fix` into the widened belief. On failure the belief keeps its covariance.
-    ///
-    /// # Errors
-    /// As [`Fix::fuse`].
-    pub fn fuse<G: InertialState<D>, S: Side, const D: usize>(
-        &self,
-        fix: &Fix,
-        belief: &mut Belief<G, S, D>,
-        options: &UpdateOptions,
-    ) -> Result<Correction<D>, UpdateError> {
-        let mut wide = self.widened(fix, belief);
-        let correction = fix.fuse(&mut wide, options)?;
-        *belief = wide;
-        Ok(correction)
-    }
-
-    fn widened<G: InertialState<D>, S: Side, const D: usize>(
-        &self,
-        fix: &Fix,
-        belief: &Belief<G, S, D>,
-    ) -> Belief<G, S, D> {
-        let mut p = *belief.left_covariance().scaled(self.scale).matrix();
-        let mut doubt = |first: usize| {
-            for axis in first..first + 3 {
-                p[(axis, axis)] += self.variance;
-            }
-        };
-        match fix.measurement {
-            Measurement::Velocity(_) => doubt(3),
-            Measurement::Position(_) => doubt(6),
-            Measurement::Heading(_) => {
-                // A turn about the vertical, in body coordinates.
-                let to_body = belief.mean.pose().rotation.matrix().transpose();
-                let up_b = to_body.column(2).into_owned();
-                let mut attitude = p.fixed_view_mut::<3, 3>(0, 0);
-                attitude += up_b * up_b.transpose() * self.variance;
-            }
-        }
-        Belief::from_left_covariance(belief.mean, Covariance::from_upper(p))
     }
 }

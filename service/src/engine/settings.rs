@@ -1,13 +1,16 @@
 //! What the engine needs of the configuration, in SI units and radians.
 
-use inekf::filter::gate::chi_square_quantile;
-use inekf::filter::{BiasPrior, Transport, UpdateOptions};
+use inekf::filter::{Alignment, BiasPrior, Gate, Transport, UpdateOptions};
+use inekf::lie::SO3;
 use inekf::model::{Discretisation, ImuNoise};
 use inekf_shared::message::MAX_SOURCES;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::fix::FixKind;
-use crate::config::{self, Config, GapPolicy, Hold, Level, WhiteNoise};
+use super::fix::{Antenna, FixKind};
+use super::stack::{Missing, StackSettings};
+use crate::config::{
+    self, Config, GapPolicy, Hold, Inertial, Level, MissingPartner, Motion, WhiteNoise,
+};
 
 /// The IMU: what it may say, how its samples are held, its noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +39,42 @@ pub struct ImuSettings {
     pub gap_gyro_sigma: f64,
     /// Doubt about the mean specific force over a gap, m/s^2.
     pub gap_accel_sigma: f64,
+}
+
+impl InitialSettings {
+    /// Whether the start waits for a position fix.
+    pub fn needs_fix(&self) -> bool {
+        self.position == PositionSource::FirstFix
+    }
+
+    /// The parts of the first belief, from an attitude and a position.
+    pub fn alignment(&self, r_wb: SO3, antenna: &Antenna) -> Alignment {
+        Alignment {
+            r_wb,
+            tilt_sigma: self.level_sigma,
+            heading_sigma: self.heading_sigma,
+            velocity_w: self.velocity_w,
+            velocity_sigma: self.velocity_sigma,
+            position_w: antenna.position_w,
+            position_covariance_w: antenna.covariance_w,
+            lever_arm_b: antenna.lever_arm_b,
+            biases: self.biases,
+        }
+    }
+
+    /// The same for a pose that is set rather than measured, without a covariance of its own.
+    pub fn alignment_at(&self, r_wb: SO3, position_w: Vector3<f64>) -> Alignment {
+        let sigma = match self.position {
+            PositionSource::Given { sigma, .. } => sigma,
+            PositionSource::FirstFix => UNSTATED_POSITION_SIGMA,
+        };
+        let here = Antenna {
+            position_w,
+            covariance_w: Matrix3::identity() * (sigma * sigma),
+            lever_arm_b: Vector3::zeros(),
+        };
+        self.alignment(r_wb, &here)
+    }
 }
 
 impl ImuSettings {
@@ -120,6 +159,8 @@ pub struct SourceSettings {
     pub lever_arm_b: Vector3<f64>,
     /// Multiplies the standard deviations of its fixes.
     pub sigma_scale: f64,
+    /// The scale error that it is assumed to have.
+    pub scale_error: f64,
 }
 
 /// The configured sources by kind and id.
@@ -128,10 +169,8 @@ pub type Sources = [[Option<SourceSettings>; MAX_SOURCES]; FixKind::COUNT];
 /// How fixes are fused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FusionSettings {
-    /// Iterations and transport; its gate is set per fix from the probability.
+    /// Iterations, transport and gate.
     pub update: UpdateOptions,
-    /// Largest NIS by dimension of the measurement (index 0 unused).
-    pub gate_by_dimension: [f64; 4],
     /// After this many gated fixes of a source in a row one is accepted; 0 never.
     pub recover_after: u32,
     /// The configured sources.
@@ -142,6 +181,21 @@ pub struct FusionSettings {
     pub late_capacity: usize,
     /// No accepted fix for this long is degraded.
     pub degraded_after_ns: u64,
+    /// Two position sources that are taken together.
+    pub stack: Option<StackSettings>,
+}
+
+impl FusionSettings {
+    /// How a measurement is fused, gated or not.
+    pub fn options(&self, gated: bool) -> UpdateOptions {
+        if gated {
+            return self.update;
+        }
+        UpdateOptions {
+            gate: Gate::OPEN,
+            ..self.update
+        }
+    }
 }
 
 /// Everything.
@@ -155,6 +209,8 @@ pub struct Settings {
     pub fusion: FusionSettings,
 }
 
+/// Standard deviation per axis of a position that comes without one, m: the configuration's default.
+const UNSTATED_POSITION_SIGMA: f64 = 10.0;
 /// A restart is certain after a gap this many times `max_gap_s`: no guess about the motion in
 /// between is worth anything then.
 const RESTART_GAPS: u64 = 20;
@@ -169,29 +225,33 @@ impl Settings {
     /// The settings that `config` asks for.
     pub fn new(config: &Config) -> Self {
         Self {
-            imu: imu(config),
+            imu: match &config.motion {
+                Motion::Inertial(inertial) => imu(inertial),
+                // An engine of odometry does not read this.
+                Motion::Odometry(_) => imu(&Inertial::default()),
+            },
             initial: initial(config),
             fusion: fusion(config),
         }
     }
 }
 
-fn imu(config: &Config) -> ImuSettings {
-    let max_gap_ns = config.imu.max_gap_ns();
+fn imu(inertial: &Inertial) -> ImuSettings {
+    let max_gap_ns = inertial.imu.max_gap_ns();
     ImuSettings {
-        g_w: Vector3::new(0.0, 0.0, -config.gravity_mps2),
-        discretisation: match config.discretisation {
+        g_w: Vector3::new(0.0, 0.0, -inertial.gravity_mps2),
+        discretisation: match inertial.discretisation {
             config::Discretisation::Zoh => Discretisation::ZeroOrderHold,
             config::Discretisation::Euler => Discretisation::Euler,
         },
-        hold: config.hold,
-        white: config.noise.white,
-        gyro_bias_walk: config.noise.gyro_bias_walk,
-        accel_bias_walk: config.noise.accel_bias_walk,
-        max_gyro: config.imu.max_gyro_rps,
-        max_accel: config.imu.max_accel_mps2,
+        hold: inertial.hold,
+        white: inertial.noise.white,
+        gyro_bias_walk: inertial.noise.gyro_bias_walk,
+        accel_bias_walk: inertial.noise.accel_bias_walk,
+        max_gyro: inertial.imu.max_gyro_rps,
+        max_accel: inertial.imu.max_accel_mps2,
         max_gap_ns,
-        restart_gap_ns: match config.imu.on_gap {
+        restart_gap_ns: match inertial.imu.on_gap {
             GapPolicy::Inflate => max_gap_ns.saturating_mul(RESTART_GAPS),
             GapPolicy::Reinitialise => max_gap_ns,
         },
@@ -236,32 +296,32 @@ fn initial(config: &Config) -> InitialSettings {
 
 fn fusion(config: &Config) -> FusionSettings {
     let mut sources = Sources::default();
-    let mut place = |kind: FixKind, id: u32, lever_arm_m: [f64; 3], sigma_scale: f64| {
+    let mut place = |kind: FixKind, id: u32, settings: SourceSettings| {
         if let Some(slot) = sources[kind as usize].get_mut(id as usize) {
-            *slot = Some(SourceSettings {
-                lever_arm_b: lever_arm_m.into(),
-                sigma_scale,
-            });
+            *slot = Some(settings);
         }
     };
     for source in &config.position_sources {
-        place(
-            FixKind::Position,
-            source.id,
-            source.lever_arm_m,
-            source.sigma_scale,
-        );
+        let settings = SourceSettings {
+            lever_arm_b: source.lever_arm_m.into(),
+            sigma_scale: source.sigma_scale,
+            scale_error: source.scale_error,
+        };
+        place(FixKind::Position, source.id, settings);
     }
-    for source in &config.velocity_sources {
-        place(FixKind::Velocity, source.id, [0.0; 3], source.sigma_scale);
+    if let Motion::Inertial(inertial) = &config.motion {
+        let scaled = |sigma_scale| SourceSettings {
+            lever_arm_b: Vector3::zeros(),
+            sigma_scale,
+            scale_error: 0.0,
+        };
+        for source in &inertial.velocity_sources {
+            place(FixKind::Velocity, source.id, scaled(source.sigma_scale));
+        }
+        for source in &inertial.heading_sources {
+            place(FixKind::Heading, source.id, scaled(source.sigma_scale));
+        }
     }
-    for source in &config.heading_sources {
-        place(FixKind::Heading, source.id, [0.0; 3], source.sigma_scale);
-    }
-    let gate = |dimension| match config.update.gate_probability {
-        Some(probability) => chi_square_quantile(dimension, probability),
-        None => f64::INFINITY,
-    };
     FusionSettings {
         update: UpdateOptions {
             iterations: config.update.iterations as usize,
@@ -270,14 +330,25 @@ fn fusion(config: &Config) -> FusionSettings {
                 config::Transport::Jacobian => Transport::Jacobian,
                 config::Transport::None => Transport::None,
             },
-            gate: f64::INFINITY,
+            gate: match config.update.gate_probability {
+                Some(probability) => Gate::of_probability(probability),
+                None => Gate::OPEN,
+            },
         },
-        gate_by_dimension: [f64::INFINITY, gate(1), gate(2), gate(3)],
         recover_after: config.update.recover_after,
         sources,
         late_window_ns: config.late.window_ns(),
         late_capacity: config.late.capacity,
         degraded_after_ns: config.health.degraded_after_ns(),
+        stack: config.stacking.as_ref().map(|stacking| StackSettings {
+            sources: stacking.sources,
+            tolerance_ns: stacking.tolerance_ns(),
+            wait_ns: stacking.wait_ns(),
+            missing: match stacking.missing {
+                MissingPartner::Unconstrained => Missing::Unconstrained,
+                MissingPartner::Skip => Missing::Skip,
+            },
+        }),
     }
 }
 

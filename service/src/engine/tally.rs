@@ -31,9 +31,9 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Counts a message of `input` (an `INPUT_*` index) and those missing before it. Each epoch is
-    /// a sender with a numbering of its own, so several may share a topic.
-    pub fn receive(&mut self, input: usize, header: &Header) {
+    /// Counts a message of `input` (an `INPUT_*` index) and those missing before it, and says how many these are.
+    /// Each epoch is a sender with a numbering of its own, so several may share a topic.
+    pub fn receive(&mut self, input: usize, header: &Header) -> u64 {
         self.received[input] += 1;
         let heard = self.received[input];
         let senders = &mut self.numbering[input];
@@ -45,6 +45,7 @@ impl Tally {
             if let Some(missing) = header.seq.checked_sub(sender.next_seq) {
                 self.counters.lost = self.counters.lost.saturating_add(missing);
                 sender.next_seq = header.seq.wrapping_add(1);
+                return missing;
             }
         } else if let Some(forgotten) = senders.iter_mut().min_by_key(|sender| sender.heard) {
             *forgotten = Numbering {
@@ -53,6 +54,7 @@ impl Tally {
                 heard,
             };
         }
+        0
     }
 
     /// Counts a refusal.

@@ -1,63 +1,60 @@
 //! The estimate along time: samples move it forward, fixes correct it at their own stamps.
 //!
-//! A ring of knots (one per sample: the sample and the belief after every fix due at its stamp)
+//! A ring of knots (one per sample: the sample and the state after every fix due at its stamp)
 //! reaches back over a bounded window. A fix between two samples splits the interval. A fix that
 //! comes late goes back to the last knot before it and the samples since are replayed: the result
 //! is bit for bit what it would have been on time. Nothing here allocates after construction.
 
 use std::collections::VecDeque;
 
-use inekf::filter::{
-    Belief, Correction, Side, UpdateError, UpdateOptions, Verdict, propagate_in_place,
-};
-use inekf::model::{ImuInput, InertialState};
+use inekf::filter::{UpdateError, Verdict};
 use inekf_shared::message::MAX_SOURCES;
 
 use super::fix::{Fix, FixKind};
+use super::model::{Fused, Model};
 use super::recovery::Widening;
-use super::settings::{FusionSettings, ImuSettings, seconds};
-use crate::config::Hold;
+use super::settings::FusionSettings;
 
 /// Fixes that may wait or be remembered at one time.
 const MAX_FIXES: usize = 1024;
 
-/// A sample, and what was believed at its stamp after the fixes due by then.
+/// A sample, and the state at its stamp after the fixes due by then.
 #[derive(Clone, Copy, Debug)]
-struct Knot<G, S, const D: usize> {
+struct Knot<I, X> {
     stamp_ns: u64,
-    /// `None` where the belief was set rather than propagated to.
-    input: Option<ImuInput>,
-    belief: Belief<G, S, D>,
+    /// `None` where the state was set rather than propagated to.
+    input: Option<I>,
+    state: X,
 }
 
 /// A fix on the timeline; once decided, a replay repeats how it was let in.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
-    fix: Fix,
+struct Entry<Z> {
+    fix: Fix<Z>,
     /// How the covariance was widened to recover from a lock-out.
     widened: Option<Widening>,
 }
 
 /// Something worth publishing.
 #[derive(Clone, Copy, Debug)]
-pub enum Event<'a, G, S, const D: usize> {
-    /// The belief was propagated to `stamp_ns`.
+pub enum Event<'a, X, Z> {
+    /// The state was propagated to `stamp_ns`.
     Propagated {
-        /// Time of the belief.
+        /// Time of the state.
         stamp_ns: u64,
         /// After the sample.
-        belief: &'a Belief<G, S, D>,
+        state: &'a X,
     },
     /// A fix was judged.
     Judged {
-        /// Time of the belief: the fix's own stamp, or the newest one after a replay.
+        /// Time of the state: the fix's own stamp, or the newest one after a replay.
         stamp_ns: u64,
         /// After the fix.
-        belief: &'a Belief<G, S, D>,
+        state: &'a X,
         /// The fix.
-        fix: &'a Fix,
+        fix: &'a Fix<Z>,
         /// What it did.
-        outcome: Result<Correction<D>, UpdateError>,
+        outcome: Result<Fused, UpdateError>,
         /// Whether samples were replayed.
         replayed: bool,
     },
@@ -76,26 +73,24 @@ pub enum Insertion {
     Full,
 }
 
-/// The belief broke down (not finite, or diverged); the timeline must be started anew.
+/// The state broke down (not finite, or diverged); the timeline must be started anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Breakdown;
 
 /// The moving window of knots and fixes.
 #[derive(Debug)]
-pub struct Timeline<G, S, const D: usize> {
-    imu: ImuSettings,
+pub struct Timeline<M: Model> {
     fusion: FusionSettings,
-    knots: VecDeque<Knot<G, S, D>>,
+    knots: VecDeque<Knot<M::Input, M::State>>,
     /// Sorted by [`Fix::order`].
-    entries: Vec<Entry>,
+    entries: Vec<Entry<M::Measurement>>,
     gated_in_a_row: [[u32; MAX_SOURCES]; FixKind::COUNT],
 }
 
-impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
+impl<M: Model> Timeline<M> {
     /// An empty timeline with all the memory it will ever use.
-    pub fn new(imu: ImuSettings, fusion: FusionSettings) -> Self {
+    pub fn new(fusion: FusionSettings) -> Self {
         Self {
-            imu,
             fusion,
             knots: VecDeque::with_capacity(fusion.late_capacity.max(2)),
             entries: Vec::with_capacity(MAX_FIXES),
@@ -103,14 +98,14 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
         }
     }
 
-    /// Forgets everything and starts from `belief` at `stamp_ns`; `input` is the sample of that
+    /// Forgets everything and starts from `state` at `stamp_ns`; `input` is the sample of that
     /// stamp if there is one.
-    pub fn start(&mut self, stamp_ns: u64, input: Option<ImuInput>, belief: Belief<G, S, D>) {
+    pub fn start(&mut self, stamp_ns: u64, input: Option<M::Input>, state: M::State) {
         self.clear();
         self.knots.push_back(Knot {
             stamp_ns,
             input,
-            belief,
+            state,
         });
     }
 
@@ -130,12 +125,12 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
         self.entries.len() - passed
     }
 
-    /// The newest stamp and belief, if started.
-    pub fn newest(&self) -> Option<(u64, &Belief<G, S, D>)> {
-        self.knots.back().map(|knot| (knot.stamp_ns, &knot.belief))
+    /// The newest stamp and state, if started.
+    pub fn newest(&self) -> Option<(u64, &M::State)> {
+        self.knots.back().map(|knot| (knot.stamp_ns, &knot.state))
     }
 
-    /// Whether the belief was set at `stamp_ns` and the sample of that stamp has not come yet.
+    /// Whether the state was set at `stamp_ns` and the sample of that stamp has not come yet.
     pub fn awaits_input_at(&self, stamp_ns: u64) -> bool {
         self.knots
             .back()
@@ -143,7 +138,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
     }
 
     /// Gives the newest knot its sample.
-    pub fn set_input(&mut self, input: ImuInput) {
+    pub fn set_input(&mut self, input: M::Input) {
         if let Some(knot) = self.knots.back_mut() {
             knot.input = Some(input);
         }
@@ -153,33 +148,35 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
     /// waiting fixes on the way. Emits an event for the sample and for each fix.
     ///
     /// # Errors
-    /// [`Breakdown`] if the belief is no longer sound.
+    /// [`Breakdown`] if the state is no longer sound.
     pub fn advance(
         &mut self,
+        model: &M,
         stamp_ns: u64,
-        input: ImuInput,
-        mut emit: impl FnMut(Event<'_, G, S, D>),
+        input: M::Input,
+        mut emit: impl FnMut(Event<'_, M::State, M::Measurement>),
     ) -> Result<(), Breakdown> {
         let Some(&from) = self.knots.back() else {
             return Err(Breakdown);
         };
         let mut sound = true;
         let to = self.run_interval(
+            model,
             &from,
             stamp_ns,
             input,
             &mut |timeline, index, event| match event {
-                Passed::Sample(belief) => {
-                    sound &= is_sound(belief, &timeline.imu);
+                Passed::Sample(state) => {
+                    sound &= model.is_sound(state);
                     if sound {
-                        emit(Event::Propagated { stamp_ns, belief });
+                        emit(Event::Propagated { stamp_ns, state });
                     }
                 }
-                Passed::Fix(belief) => {
-                    let outcome = timeline.judge(index, belief, true);
+                Passed::Fix(state) => {
+                    let outcome = timeline.judge(model, index, state, true);
                     emit(Event::Judged {
                         stamp_ns: timeline.entries[index].fix.stamp_ns,
-                        belief,
+                        state,
                         fix: &timeline.entries[index].fix,
                         outcome,
                         replayed: false,
@@ -192,7 +189,12 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
     }
 
     /// Takes in a fix: ahead of the newest knot it waits, at or before it it is fused at once.
-    pub fn insert(&mut self, fix: Fix, mut emit: impl FnMut(Event<'_, G, S, D>)) -> Insertion {
+    pub fn insert(
+        &mut self,
+        model: &M,
+        fix: Fix<M::Measurement>,
+        mut emit: impl FnMut(Event<'_, M::State, M::Measurement>),
+    ) -> Insertion {
         let Some((newest_ns, _)) = self.newest() else {
             return Insertion::TooLate;
         };
@@ -228,27 +230,32 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
 
         let mut outcome = Err(UpdateError::NotFinite);
         if self.knots[back_to].stamp_ns == fix.stamp_ns {
-            let mut belief = self.knots[back_to].belief;
-            outcome = self.judge(index, &mut belief, true);
-            self.knots[back_to].belief = belief;
+            let mut state = self.knots[back_to].state;
+            outcome = self.judge(model, index, &mut state, true);
+            self.knots[back_to].state = state;
         }
         for later in back_to + 1..self.knots.len() {
             let (from, to) = (self.knots[later - 1], self.knots[later]);
             let Some(input) = to.input else { continue };
-            self.knots[later] =
-                self.run_interval(&from, to.stamp_ns, input, &mut |timeline, at, event| {
-                    if let Passed::Fix(belief) = event {
-                        let judged = timeline.judge(at, belief, at == index);
+            self.knots[later] = self.run_interval(
+                model,
+                &from,
+                to.stamp_ns,
+                input,
+                &mut |timeline, at, event| {
+                    if let Passed::Fix(state) = event {
+                        let judged = timeline.judge(model, at, state, at == index);
                         if at == index {
                             outcome = judged;
                         }
                     }
-                });
+                },
+            );
         }
         if let Some(newest) = self.knots.back() {
             emit(Event::Judged {
                 stamp_ns: newest.stamp_ns,
-                belief: &newest.belief,
+                state: &newest.state,
                 fix: &fix,
                 outcome,
                 replayed: lateness_ns > 0,
@@ -258,27 +265,24 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
     }
 
     /// Propagates from a knot to the sample at `stamp_ns`, stopping at each fix on the way (and,
-    /// after the sample, at those of its very stamp) to hand the belief to `pass`.
+    /// after the sample, at those of its very stamp) to hand the state to `pass`.
     fn run_interval(
         &mut self,
-        from: &Knot<G, S, D>,
+        model: &M,
+        from: &Knot<M::Input, M::State>,
         stamp_ns: u64,
-        input: ImuInput,
-        pass: &mut impl FnMut(&mut Self, usize, Passed<'_, G, S, D>),
-    ) -> Knot<G, S, D> {
-        let interval_ns = stamp_ns - from.stamp_ns;
-        let held = self.held(from.input, input, interval_ns);
-        let noise = self.imu.noise(interval_ns);
-        let (g_w, discretisation) = (self.imu.g_w, self.imu.discretisation);
-        let move_to = |belief: &mut Belief<G, S, D>, now_ns: &mut u64, to_ns: u64| {
+        input: M::Input,
+        pass: &mut impl FnMut(&mut Self, usize, Passed<'_, M::State>),
+    ) -> Knot<M::Input, M::State> {
+        let motion = model.motion(from.input.as_ref(), &input, stamp_ns - from.stamp_ns);
+        let move_to = |state: &mut M::State, now_ns: &mut u64, to_ns: u64| {
             if to_ns > *now_ns {
-                let dt_s = seconds(to_ns - *now_ns);
-                propagate_in_place(belief, &held, &g_w, dt_s, discretisation, &noise);
+                model.advance(state, &motion, to_ns - *now_ns);
                 *now_ns = to_ns;
             }
         };
 
-        let mut belief = from.belief;
+        let mut state = from.state;
         let mut now_ns = from.stamp_ns;
         let mut index = self
             .entries
@@ -288,75 +292,53 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
             if fix_ns >= stamp_ns {
                 break;
             }
-            move_to(&mut belief, &mut now_ns, fix_ns);
-            pass(self, index, Passed::Fix(&mut belief));
+            move_to(&mut state, &mut now_ns, fix_ns);
+            pass(self, index, Passed::Fix(&mut state));
             index += 1;
         }
-        move_to(&mut belief, &mut now_ns, stamp_ns);
-        pass(self, index, Passed::Sample(&belief));
+        move_to(&mut state, &mut now_ns, stamp_ns);
+        pass(self, index, Passed::Sample(&state));
         while self
             .entries
             .get(index)
             .is_some_and(|entry| entry.fix.stamp_ns == stamp_ns)
         {
-            pass(self, index, Passed::Fix(&mut belief));
+            pass(self, index, Passed::Fix(&mut state));
             index += 1;
         }
         Knot {
             stamp_ns,
             input: Some(input),
-            belief,
+            state,
         }
     }
 
-    /// The input that speaks for an interval. Over a gap neither end does: their mean is the best
-    /// guess, and [`ImuSettings::noise`] doubts it.
-    fn held(&self, before: Option<ImuInput>, after: ImuInput, interval_ns: u64) -> ImuInput {
-        let Some(before) = before else { return after };
-        if interval_ns > self.imu.max_gap_ns {
-            return before.midpoint(&after);
-        }
-        match self.imu.hold {
-            Hold::Backward => after,
-            Hold::Forward => before,
-            Hold::Midpoint => before.midpoint(&after),
-        }
-    }
-
-    /// Fuses the fix at `index` into `belief`, or gates it. Only a `fresh` decision counts towards
+    /// Fuses the fix at `index` into `state`, or gates it. Only a `fresh` decision counts towards
     /// lock-out recovery; a replay repeats the widening decided then.
     fn judge(
         &mut self,
+        model: &M,
         index: usize,
-        belief: &mut Belief<G, S, D>,
+        state: &mut M::State,
         fresh: bool,
-    ) -> Result<Correction<D>, UpdateError> {
+    ) -> Result<Fused, UpdateError> {
         let Entry { fix, widened } = self.entries[index];
-        let dimension = fix.dimension();
-        let open = UpdateOptions {
-            gate: f64::INFINITY,
-            ..self.fusion.update
-        };
         if let (false, Some(widening)) = (fresh, widened) {
-            return widening.fuse(&fix, belief, &open);
+            return model.fuse_widened(state, &fix, &widening);
         }
-        let gated = UpdateOptions {
-            gate: self.fusion.gate_by_dimension[dimension],
-            ..self.fusion.update
-        };
-        let outcome = fix.fuse(belief, &gated);
+        let outcome = model.fuse(state, &fix, true);
         if !fresh {
             return outcome;
         }
         let in_a_row = &mut self.gated_in_a_row[fix.kind() as usize][fix.source as usize];
         match outcome {
-            Ok(correction) if correction.verdict == Verdict::Gated => {
+            Ok(fused) if fused.verdict == Verdict::Gated => {
                 *in_a_row += 1;
                 if self.fusion.recover_after > 0 && *in_a_row > self.fusion.recover_after {
                     *in_a_row = 0;
-                    let widening = Widening::new(&fix, &belief.mean, correction.nis);
+                    let widening = model.widening(state, &fix, fused.nis);
                     self.entries[index].widened = Some(widening);
-                    return widening.fuse(&fix, belief, &open);
+                    return model.fuse_widened(state, &fix, &widening);
                 }
             }
             _ => *in_a_row = 0,
@@ -365,7 +347,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
     }
 
     /// Appends a knot, forgetting what has left the window.
-    fn push(&mut self, knot: Knot<G, S, D>) {
+    fn push(&mut self, knot: Knot<M::Input, M::State>) {
         let capacity = self.fusion.late_capacity.max(2);
         while self.knots.len() >= capacity {
             self.knots.pop_front();
@@ -401,31 +383,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Timeline<G, S, D> {
 }
 
 /// What [`Timeline::run_interval`] passes on its way.
-enum Passed<'a, G, S, const D: usize> {
-    Sample(&'a Belief<G, S, D>),
-    Fix(&'a mut Belief<G, S, D>),
-}
-
-/// Beyond this, m, an estimate is not of this world: the filter has diverged.
-const MAX_POSITION_M: f64 = 1e10;
-/// Likewise, m/s.
-const MAX_VELOCITY_MPS: f64 = 1e6;
-
-/// A cheap check that the belief has not broken down. A bias beyond what its sensor can read is
-/// none.
-fn is_sound<G: InertialState<D>, S: Side, const D: usize>(
-    belief: &Belief<G, S, D>,
-    imu: &ImuSettings,
-) -> bool {
-    let mean = &belief.mean;
-    let pose = mean.pose();
-    mean.is_finite()
-        && pose.position.amax() <= MAX_POSITION_M
-        && pose.velocity.amax() <= MAX_VELOCITY_MPS
-        && mean.gyro_bias().amax() <= imu.max_gyro
-        && mean.accel_bias().amax() <= imu.max_accel
-        && (0..D).all(|i| {
-            let variance = belief.covariance.matrix()[(i, i)];
-            variance.is_finite() && variance >= 0.0
-        })
+enum Passed<'a, X> {
+    Sample(&'a X),
+    Fix(&'a mut X),
 }

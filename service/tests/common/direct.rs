@@ -1,6 +1,6 @@
 //! The filter without the engine: the oracle of what the engine does with the library.
 
-use inekf::filter::{Belief, Covariance, Left, Transport, UpdateOptions, propagate, update};
+use inekf::filter::{Belief, Covariance, Gate, Left, Transport, UpdateOptions, propagate, update};
 use inekf::lie::{SE23, SO3};
 use inekf::model::{
     Discretisation, HeadingObservation, ImuInput, ImuNoise, InertialState, NavState, Observation,
@@ -98,7 +98,7 @@ impl Direct {
             iterations: 10,
             tolerance: 1e-6,
             transport: Transport::Jacobian,
-            gate: f64::INFINITY,
+            gate: Gate::OPEN,
         };
         let correction = update(&mut self.belief, observation, &options).unwrap();
         assert!(correction.xi.norm() > 0.0, "the fix must say something");

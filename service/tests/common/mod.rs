@@ -81,9 +81,9 @@ impl Input {
 }
 
 /// Gives `input` to `engine`.
-pub fn feed(engine: &mut Engine, input: &Input, outbox: &mut impl Outbox) {
+pub fn feed(engine: &mut Engine, input: &Input, outbox: &mut impl Outbox<EstimateSe23>) {
     match input {
-        Input::Imu(message) => engine.imu(message, message.header.sent_ns + 1, outbox),
+        Input::Imu(message) => engine.sample(message, message.header.sent_ns + 1, outbox),
         Input::Position(message) => engine.position(message, outbox),
         Input::Velocity(message) => engine.velocity(message, outbox),
         Input::Heading(message) => engine.heading(message, outbox),

@@ -105,7 +105,7 @@ layout! {
 /// What the daemon answers.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.ControlResponse.v1")]
+#[type_name("inekf.ControlResponse.v2")]
 pub struct ControlResponse {
     /// The id of the request.
     pub request_id: u64,
@@ -131,9 +131,9 @@ pub struct ControlResponse {
 }
 
 layout! {
-    ControlResponse as "inekf.ControlResponse.v1", size 1600, align 8 {
+    ControlResponse as "inekf.ControlResponse.v2", size 1608, align 8 {
         request_id: 0, status: 8, state_code: 12, waiting_for: 16, reason_len: 20, reason: 24,
-        counters: 280, received: 320, rejected_by_reason: 368, state: 496,
+        counters: 280, received: 328, rejected_by_reason: 376, state: 504,
     }
 }
 

@@ -9,7 +9,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 use super::layout::layout;
-use super::{MAX_SOURCES, Message, NAV_TRI, SE2_TRI, SE3_TRI, Zero, serde_array};
+use super::{MAX_MISMATCHES, MAX_SOURCES, Message, NAV_TRI, SE2_TRI, SE3_TRI, Zero, serde_array};
 
 /// Flag: a sample was propagated.
 pub const ESTIMATE_PROPAGATED: u32 = 1;
@@ -34,6 +34,9 @@ pub const MODEL_ODOMETRY_2D: u32 = 3;
 
 /// The `source` of an estimate that no fix was fused into.
 pub const NO_SOURCE: u32 = u32::MAX;
+
+/// The `mode` of an estimate that has none.
+pub const NO_MODE: u32 = u32::MAX;
 
 /// Name of one estimate flag; `"unknown"` for anything else, a combination of flags included.
 #[must_use]
@@ -62,7 +65,7 @@ pub const fn model_name(code: u32) -> &'static str {
 /// What became of the inputs since the daemon's start.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.Counters.v1")]
+#[type_name("inekf.Counters.v2")]
 pub struct Counters {
     /// Fixes that were fused.
     pub accepted: u64,
@@ -74,18 +77,20 @@ pub struct Counters {
     pub lost: u64,
     /// Inputs that were refused by a check; by reason in [`super::Health`].
     pub rejected: u64,
+    /// Position fixes of a stack whose partner did not come in time.
+    pub unpaired: u64,
 }
 
 layout! {
-    Counters as "inekf.Counters.v1", size 40, align 8 {
-        accepted: 0, gated: 8, late: 16, lost: 24, rejected: 32,
+    Counters as "inekf.Counters.v2", size 48, align 8 {
+        accepted: 0, gated: 8, late: 16, lost: 24, rejected: 32, unpaired: 40,
     }
 }
 
 /// What every estimate starts with.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.EstimateHead.v1")]
+#[type_name("inekf.EstimateHead.v2")]
 pub struct EstimateHead {
     /// Time the state holds at, nanoseconds of the sensor clock.
     pub stamp_ns: u64,
@@ -111,6 +116,11 @@ pub struct EstimateHead {
     pub source: u32,
     /// Dimension of the covariance: 15 or 9 (SE_2(3)), 6 (SE(3)), 3 (SE(2)).
     pub dimension: u32,
+    /// Bit i: the last update of this estimate allowed for mismatch i of the configuration (a constraint of the
+    /// gain, or a parameter beside the pose). Zero where none is declared.
+    pub active_mismatches: u32,
+    /// With adaptive mismatches, the likeliest mode (`inekf::filter::standard_modes`); else [`NO_MODE`].
+    pub mode: u32,
     /// What became of the inputs.
     pub counters: Counters,
     /// Last normalised innovation squared of each position source; NaN before its first fix.
@@ -118,17 +128,18 @@ pub struct EstimateHead {
 }
 
 layout! {
-    EstimateHead as "inekf.EstimateHead.v1", size 184, align 8 {
+    EstimateHead as "inekf.EstimateHead.v2", size 200, align 8 {
         stamp_ns: 0, seq: 8, sent_ns: 16, received_ns: 24, published_ns: 32, estimate_seq: 40,
         reset_count: 48, reset_jump_m: 56, flags: 64, state: 68, source: 72, dimension: 76,
-        counters: 80, nis: 120,
+        active_mismatches: 80, mode: 84, counters: 88, nis: 136,
     }
 }
 
 impl EstimateHead {
-    /// The head before anything has happened: zero, but no source and every NIS NaN.
+    /// The head before anything has happened: zero, but no source, no mode and every NIS NaN.
     pub const UNSTARTED: Self = Self {
         source: NO_SOURCE,
+        mode: NO_MODE,
         nis: [f64::NAN; MAX_SOURCES],
         ..Self::ZERO
     };
@@ -137,7 +148,7 @@ impl EstimateHead {
 /// Estimate of the IMU model: pose and velocity on SE_2(3), biases beside it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.EstimateSe23.v1")]
+#[type_name("inekf.EstimateSe23.v2")]
 pub struct EstimateSe23 {
     /// Stamps, flags and counters.
     pub head: EstimateHead,
@@ -158,16 +169,16 @@ pub struct EstimateSe23 {
 }
 
 layout! {
-    EstimateSe23 as "inekf.EstimateSe23.v1", size 1272, align 8 {
-        head: 0, q_wb: 184, v_w_mps: 216, p_w_m: 240, gyro_bias_rps: 264, accel_bias_mps2: 288,
-        covariance: 312,
+    EstimateSe23 as "inekf.EstimateSe23.v2", size 1288, align 8 {
+        head: 0, q_wb: 200, v_w_mps: 232, p_w_m: 256, gyro_bias_rps: 280, accel_bias_mps2: 304,
+        covariance: 328,
     }
 }
 
 /// Estimate of the spatial odometry model: a pose on SE(3).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.EstimateSe3.v1")]
+#[type_name("inekf.EstimateSe3.v2")]
 pub struct EstimateSe3 {
     /// Stamps, flags and counters.
     pub head: EstimateHead,
@@ -177,18 +188,23 @@ pub struct EstimateSe3 {
     pub p_w_m: [f64; 3],
     /// Upper triangle of the covariance: rotation, position.
     pub covariance: [f64; SE3_TRI],
+    /// Estimated parameters of the declared mismatches, in the order of the configuration and each in its own unit;
+    /// NaN where none is estimated.
+    pub mismatch: [f64; MAX_MISMATCHES],
+    /// Their standard deviations.
+    pub mismatch_sigma: [f64; MAX_MISMATCHES],
 }
 
 layout! {
-    EstimateSe3 as "inekf.EstimateSe3.v1", size 408, align 8 {
-        head: 0, q_wb: 184, p_w_m: 216, covariance: 240,
+    EstimateSe3 as "inekf.EstimateSe3.v2", size 520, align 8 {
+        head: 0, q_wb: 200, p_w_m: 232, covariance: 256, mismatch: 424, mismatch_sigma: 472,
     }
 }
 
 /// Estimate of the planar odometry model: a pose on SE(2).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.EstimateSe2.v1")]
+#[type_name("inekf.EstimateSe2.v2")]
 pub struct EstimateSe2 {
     /// Stamps, flags and counters.
     pub head: EstimateHead,
@@ -198,11 +214,16 @@ pub struct EstimateSe2 {
     pub p_w_m: [f64; 2],
     /// Upper triangle of the covariance: theta, x, y.
     pub covariance: [f64; SE2_TRI],
+    /// Estimated parameters of the declared mismatches, in the order of the configuration and each in its own unit;
+    /// NaN where none is estimated.
+    pub mismatch: [f64; MAX_MISMATCHES],
+    /// Their standard deviations.
+    pub mismatch_sigma: [f64; MAX_MISMATCHES],
 }
 
 layout! {
-    EstimateSe2 as "inekf.EstimateSe2.v1", size 256, align 8 {
-        head: 0, theta_rad: 184, p_w_m: 192, covariance: 208,
+    EstimateSe2 as "inekf.EstimateSe2.v2", size 368, align 8 {
+        head: 0, theta_rad: 200, p_w_m: 208, covariance: 224, mismatch: 272, mismatch_sigma: 320,
     }
 }
 

@@ -138,7 +138,7 @@ pub const fn input_name(index: usize) -> &'static str {
 /// How the daemon is, about once a second.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.Health.v1")]
+#[type_name("inekf.Health.v2")]
 pub struct Health {
     /// When it was written, CLOCK_MONOTONIC, nanoseconds.
     pub stamp_ns: u64,
@@ -167,9 +167,9 @@ pub struct Health {
 }
 
 layout! {
-    Health as "inekf.Health.v1", size 272, align 8 {
+    Health as "inekf.Health.v2", size 280, align 8 {
         stamp_ns: 0, uptime_ns: 8, instance_pid: 16, state: 24, waiting_for: 28, model: 32,
-        flags: 36, last_imu_stamp_ns: 40, imu_rate_hz: 48, counters: 56, rejected_by_reason: 96,
-        received: 224,
+        flags: 36, last_imu_stamp_ns: 40, imu_rate_hz: 48, counters: 56, rejected_by_reason: 104,
+        received: 232,
     }
 }

@@ -32,8 +32,8 @@ pub use control::{
 pub use estimate::{
     Counters, ESTIMATE_DEGRADED, ESTIMATE_FLAGS, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED,
     ESTIMATE_RESET, ESTIMATE_UPDATED, EstimateHead, EstimateMessage, EstimateSe2, EstimateSe3,
-    EstimateSe23, MODEL_IMU, MODEL_ODOMETRY_2D, MODEL_ODOMETRY_3D, NO_SOURCE, estimate_flag_name,
-    model_name,
+    EstimateSe23, MODEL_IMU, MODEL_ODOMETRY_2D, MODEL_ODOMETRY_3D, NO_MODE, NO_SOURCE,
+    estimate_flag_name, model_name,
 };
 pub use header::Header;
 pub use heading::HeadingFix;
@@ -54,6 +54,9 @@ pub use velocity::VelocityFix;
 
 /// How many sources of position an estimate reports on: source ids are `0..MAX_SOURCES`.
 pub const MAX_SOURCES: usize = 8;
+
+/// How many parameters of mismatches an estimate reports on.
+pub const MAX_MISMATCHES: usize = 6;
 
 /// Dimension of the navigation error with biases: rotation, velocity, position, gyro bias, accelerometer bias.
 pub const NAV_DIM: usize = 15;

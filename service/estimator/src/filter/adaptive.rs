@@ -20,6 +20,8 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::belief::Belief;
+use super::covariance::Covariance;
+use super::gate::Gate;
 use super::propagate::moved;
 use super::side::Left;
 use super::update::{UpdateError, UpdateOptions, Verdict, update};
@@ -44,6 +46,15 @@ pub struct Adaptive<G, const B: usize, const P: usize, const D: usize, const S: 
     unmixed_s: f64,
     /// Whether a measurement came since the modes were last mixed.
     measured: bool,
+}
+
+/// What an observation did to a bank.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weighed {
+    /// Whether it was used.
+    pub verdict: Verdict,
+    /// The normalised innovation squared of the mode that foretold it best.
+    pub nis: f64,
 }
 
 /// An observation with the noise that a mode adds to it.
@@ -109,7 +120,7 @@ where
     /// step's noise, B x B, of the left-invariant error.
     pub fn advance<const N: usize>(
         &mut self,
-        unknowns: &Unknowns<'_>,
+        unknowns: &Unknowns,
         step: &OdometryStep<G>,
         q: &SMatrix<f64, B, B>,
     ) where
@@ -142,13 +153,29 @@ where
     where
         O: Observation<Augmented<G, B, P, D>, D, M>,
     {
+        let gate = self.options.gate;
+        Ok(self.update_through(observation, &gate)?.verdict)
+    }
+
+    /// The same through another gate than the bank's own.
+    ///
+    /// # Errors
+    /// As [`update`](Self::update).
+    pub fn update_through<O, const M: usize>(
+        &mut self,
+        observation: &O,
+        gate: &Gate,
+    ) -> Result<Weighed, UpdateError>
+    where
+        O: Observation<Augmented<G, B, P, D>, D, M>,
+    {
         let ungated = UpdateOptions {
-            gate: f64::INFINITY,
+            gate: Gate::OPEN,
             ..self.options
         };
         let mut beliefs = self.beliefs;
         let mut logs = [f64::NEG_INFINITY; S];
-        let mut least_nis = f64::INFINITY;
+        let mut nis = f64::INFINITY;
         for (j, belief) in beliefs.iter_mut().enumerate() {
             let h = observation.left_jacobian(&belief.mean);
             let noisy = WithNoise {
@@ -156,11 +183,14 @@ where
                 noise: observation.noise() + self.modes[j].noise_of_measurement(&h),
             };
             let correction = update(belief, &noisy, &ungated)?;
-            least_nis = least_nis.min(correction.nis);
+            nis = nis.min(correction.nis);
             logs[j] = self.weights[j].ln() - 0.5 * (correction.nis + correction.log_determinant);
         }
-        if least_nis > self.options.gate {
-            return Ok(Verdict::Gated);
+        if !gate.admits(nis, M) {
+            return Ok(Weighed {
+                verdict: Verdict::Gated,
+                nis,
+            });
         }
         let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let likelihoods = logs.map(|log| (log - best).exp());
@@ -168,7 +198,20 @@ where
         self.weights = likelihoods.map(|likelihood| likelihood / total);
         self.beliefs = beliefs;
         self.measured = true;
-        Ok(Verdict::Accepted)
+        Ok(Weighed {
+            verdict: Verdict::Accepted,
+            nis,
+        })
+    }
+
+    /// The same bank with the covariance of every mode as `f` makes it.
+    #[must_use]
+    pub fn with_covariances(&self, f: impl Fn(&Covariance<D>) -> Covariance<D>) -> Self {
+        let beliefs = self.beliefs.each_ref();
+        Self {
+            beliefs: beliefs.map(|belief| Belief::new(belief.mean, f(&belief.covariance))),
+            ..*self
+        }
     }
 
     /// The weights of the modes, which add up to one.

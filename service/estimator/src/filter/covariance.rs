@@ -96,6 +96,14 @@ impl<const D: usize> Covariance<D> {
         put_back_negative_variances(&mut self.0);
     }
 
+    /// The same, of a product that is a covariance but for rounding.
+    pub(crate) fn from_rounded(matrix: SMatrix<f64, D, D>) -> Self {
+        let mut matrix = matrix;
+        put_back_negative_variances(&mut matrix);
+        mirror(&mut matrix);
+        Self(matrix)
+    }
+
     /// Independent components with these variances.
     pub fn from_variances(variances: &SVector<f64, D>) -> Self {
         Self(SMatrix::from_diagonal(variances))

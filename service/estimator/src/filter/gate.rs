@@ -4,6 +4,45 @@
 //! integer k: `Q_1(x) = erfc(sqrt(x/2))`, `Q_2(x) = exp(-x/2)`, and
 //! `Q_{k+2}(x) = Q_k(x) + (x/2)^{k/2} exp(-x/2) / Gamma(k/2 + 1)`.
 
+/// Most degrees of freedom that an innovation has.
+pub const MAX_DEGREES: usize = 16;
+
+/// Largest normalised innovation squared that is let in, for each number of degrees of freedom.
+///
+/// The degrees are those that the filter finds: hard constraints take theirs from the innovation, and what is
+/// left must be judged by its own number. An innovation of which nothing is left is let in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gate {
+    /// By degrees of freedom.
+    limits: [f64; MAX_DEGREES + 1],
+}
+
+impl Gate {
+    /// Lets everything in.
+    pub const OPEN: Self = Self::at(f64::INFINITY);
+
+    /// Lets in what is at most `limit`, whatever the degrees.
+    pub const fn at(limit: f64) -> Self {
+        let mut limits = [limit; MAX_DEGREES + 1];
+        limits[0] = f64::INFINITY;
+        Self { limits }
+    }
+
+    /// Lets in what a consistent filter sees with `probability`; 1 or more lets everything in.
+    pub fn of_probability(probability: f64) -> Self {
+        let mut gate = Self::OPEN;
+        for (degrees, limit) in gate.limits.iter_mut().enumerate().skip(1) {
+            *limit = chi_square_quantile(degrees, probability);
+        }
+        gate
+    }
+
+    /// Whether an innovation with this normalised square is let in.
+    pub fn admits(&self, nis: f64, degrees: usize) -> bool {
+        self.limits.get(degrees).is_none_or(|limit| nis <= *limit)
+    }
+}
+
 /// Probability that a chi-square variable with `degrees >= 1` degrees of freedom exceeds `x`.
 pub fn chi_square_survival(degrees: usize, x: f64) -> f64 {
     if x <= 0.0 {

@@ -1,10 +1,11 @@
 //! Beliefs on Lie groups, and what happens to them.
 //!
-//! [`Belief`] is a concentrated Gaussian in the left- or right-invariant error ([`side`]), or in the
-//! additive one of the EKF ([`additive`]); [`mod@propagate`] moves it with the IMU or with odometry,
-//! [`mod@update`] corrects it with an observation: one core for every sensor, group, side and filter. What
-//! tells the filters apart is the side and the rule of the gain ([`gain`]): Kalman's, the linearly
-//! constrained one ([`constrained`], on the algebra of [`constraint`]), H-infinity ([`hinf`]), Schmidt's.
+//! [`Belief`] is a concentrated Gaussian in the left- or right-invariant error ([`side`]), in the
+//! additive one of the EKF ([`additive`]), or in those of the usual smoothers ([`componentwise`]);
+//! [`mod@propagate`] moves it with the IMU or with odometry, [`mod@update`] corrects it with an observation: one
+//! core for every sensor, group, side and filter. What tells the filters apart is the side and the rule of the
+//! gain ([`gain`]): Kalman's, the linearly constrained one ([`constrained`], on the algebra of [`constraint`]),
+//! H-infinity ([`hinf`]), Schmidt's.
 //! [`adaptive`] runs several filters at once where the behaviour of a mismatch is itself unknown,
 //! [`gate`] judges innovations, [`alignment`] makes the first belief.
 //!
@@ -25,6 +26,7 @@ pub mod adaptive;
 pub mod additive;
 pub mod alignment;
 pub mod belief;
+pub mod componentwise;
 pub mod constrained;
 pub mod constraint;
 pub mod covariance;
@@ -37,19 +39,21 @@ pub mod propagate;
 pub mod side;
 pub mod update;
 
-pub use adaptive::{Adaptive, Expected, Mode, STANDARD_MODES, Switching, standard_modes};
+pub use adaptive::{Adaptive, Expected, Mode, STANDARD_MODES, Switching, Weighed, standard_modes};
 pub use additive::Additive;
 pub use alignment::{Alignment, BiasPrior, Levelled};
 pub use belief::Belief;
+pub use componentwise::{Forster, Gtsam};
 pub use constrained::Constrained;
 pub use constraint::Constraints;
 pub use covariance::Covariance;
 pub use factor::Factor;
 pub use gain::{Consider, GainRule, Judgement, Kalman};
+pub use gate::Gate;
 pub use hinf::{HInfinity, HInfinityGain};
 pub use linearised::Linearised;
 pub use propagate::{
     propagate, propagate_augmented, propagate_dense, propagate_in_place, propagate_odometry,
 };
-pub use side::{Left, Right, Side};
+pub use side::{InertialSide, Left, Right, Side};
 pub use update::{Correction, Transport, UpdateError, UpdateOptions, Verdict, update, update_with};

@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, Vector3};
 
 use super::belief::Belief;
-use super::side::Side;
+use super::side::{InertialSide, Side};
 use crate::lie::LieGroup;
 use crate::model::{
     Augmented, Discretisation, ImuInput, ImuNoise, InertialState, OdometryStep, RigidPose, Unknowns,
@@ -12,7 +12,7 @@ use crate::model::{
 /// Moves `belief` over `dt_s` seconds with the raw sample `measured` (its biases are removed here).
 ///
 /// `P+ = F P F^T + Q` in the error of side S, by blocks ([`Transition`](crate::model::Transition)).
-pub fn propagate<G: InertialState<D>, S: Side, const D: usize>(
+pub fn propagate<G: InertialState<D>, S: InertialSide, const D: usize>(
     belief: &Belief<G, S, D>,
     measured: &ImuInput,
     g_w: &Vector3<f64>,
@@ -27,7 +27,7 @@ pub fn propagate<G: InertialState<D>, S: Side, const D: usize>(
 
 /// [`propagate`] without a second belief.
 #[inline]
-pub fn propagate_in_place<G: InertialState<D>, S: Side, const D: usize>(
+pub fn propagate_in_place<G: InertialState<D>, S: InertialSide, const D: usize>(
     belief: &mut Belief<G, S, D>,
     measured: &ImuInput,
     g_w: &Vector3<f64>,
@@ -80,7 +80,7 @@ where
 /// noise of the step on the pose and the random walk of the parameters, D x D.
 pub fn propagate_augmented<G, S, const B: usize, const P: usize, const D: usize, const N: usize>(
     belief: &Belief<Augmented<G, B, P, D>, S, D>,
-    unknowns: &Unknowns<'_>,
+    unknowns: &Unknowns,
     step: &OdometryStep<G>,
     q: &SMatrix<f64, D, D>,
 ) -> Belief<Augmented<G, B, P, D>, S, D>

@@ -22,6 +22,7 @@ use nalgebra::SVector;
 use super::belief::Belief;
 use super::factor::Factor;
 use super::gain::{GainRule, Iterate, Judgement, Kalman};
+use super::gate::{Gate, MAX_DEGREES};
 use super::linearised::Linearised;
 use super::side::Side;
 use crate::lie::LieGroup;
@@ -46,8 +47,8 @@ pub struct UpdateOptions {
     pub tolerance: f64,
     /// What happens to the covariance.
     pub transport: Transport,
-    /// An innovation with a larger normalised square than this is refused; infinity accepts all.
-    pub gate: f64,
+    /// What innovation is refused, by the degrees of freedom that the rule leaves it.
+    pub gate: Gate,
 }
 
 impl UpdateOptions {
@@ -56,7 +57,7 @@ impl UpdateOptions {
         iterations: 1,
         tolerance: 0.0,
         transport: Transport::None,
-        gate: f64::INFINITY,
+        gate: Gate::OPEN,
     };
 
     /// The default of this library: iterated, with transport.
@@ -64,7 +65,7 @@ impl UpdateOptions {
         iterations: 10,
         tolerance: 1e-6,
         transport: Transport::Jacobian,
-        gate: f64::INFINITY,
+        gate: Gate::OPEN,
     };
 }
 
@@ -211,6 +212,12 @@ where
     O: Observation<G, D, M>,
     L: GainRule<G, D, M>,
 {
+    const {
+        assert!(
+            M <= MAX_DEGREES,
+            "a gate knows the quantiles of MAX_DEGREES at most"
+        )
+    };
     let noise = observation.noise();
     let noise_factor = Factor::new(&noise).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
     let cost = |iterate: &Iterate<D>, chi: &G| {
@@ -229,7 +236,7 @@ where
         return Err(UpdateError::NotFinite);
     }
     let log_determinant = linearised.log_determinant();
-    if nis > options.gate {
+    if !options.gate.admits(nis, degrees) {
         return Ok(Correction {
             verdict: Verdict::Gated,
             nis,

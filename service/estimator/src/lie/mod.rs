@@ -41,6 +41,10 @@ pub trait LieGroup<const D: usize>: Copy + Clone + Debug + PartialEq {
     /// How many of the leading tangent coordinates are the rotation: 1 in the plane, 3 in space.
     const ROTATION_DIM: usize;
 
+    /// How many of the tangent coordinates that follow the rotation are a velocity: 3 in the groups of inertial
+    /// navigation, 0 in those of poses.
+    const VELOCITY_DIM: usize = 0;
+
     /// The neutral element: `X identity = identity X = X`.
     fn identity() -> Self;
 
@@ -57,6 +61,11 @@ pub trait LieGroup<const D: usize>: Copy + Clone + Debug + PartialEq {
 
     /// The inverse: `X X^-1 = identity`.
     fn inverse(&self) -> Self;
+
+    /// The element that leads from `X` to `Y`, `X^-1 Y`.
+    fn between(&self, other: &Self) -> Self {
+        self.inverse().compose(other)
+    }
 
     /// The adjoint matrix, `X exp(xi) X^-1 = exp(Ad_X xi)`.
     fn adjoint(&self) -> SMatrix<f64, D, D>;

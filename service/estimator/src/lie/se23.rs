@@ -23,6 +23,7 @@ pub struct SE23 {
 
 impl LieGroup<9> for SE23 {
     const ROTATION_DIM: usize = 3;
+    const VELOCITY_DIM: usize = 3;
 
     fn identity() -> Self {
         Self {
@@ -43,6 +44,7 @@ impl LieGroup<9> for SE23 {
         }
     }
 
+    #[inline]
     fn log(&self) -> SVector<f64, 9> {
         let phi = self.rotation.log();
         let rho = left_jacobian_inverse_times(&phi, &[self.velocity, self.position]);
@@ -64,6 +66,16 @@ impl LieGroup<9> for SE23 {
             rotation: self.rotation.inverse(),
             velocity: -self.rotation.inverse_rotate(&self.velocity),
             position: -self.rotation.inverse_rotate(&self.position),
+        }
+    }
+
+    #[inline]
+    fn between(&self, other: &Self) -> Self {
+        let back = |a: &Vector3<f64>| self.rotation.inverse_rotate(a);
+        Self {
+            rotation: self.rotation.inverse() * other.rotation,
+            velocity: back(&(other.velocity - self.velocity)),
+            position: back(&(other.position - self.position)),
         }
     }
 

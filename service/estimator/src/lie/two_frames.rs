@@ -37,6 +37,7 @@ pub struct TwoFrames {
 
 impl LieGroup<15> for TwoFrames {
     const ROTATION_DIM: usize = 3;
+    const VELOCITY_DIM: usize = 3;
 
     fn identity() -> Self {
         Self {

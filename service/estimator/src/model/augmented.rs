@@ -51,6 +51,7 @@ impl<G: LieGroup<B>, const B: usize, const P: usize, const D: usize> LieGroup<D>
     for Augmented<G, B, P, D>
 {
     const ROTATION_DIM: usize = G::ROTATION_DIM;
+    const VELOCITY_DIM: usize = G::VELOCITY_DIM;
 
     fn identity() -> Self {
         Self::new(G::identity(), SVector::zeros())

@@ -12,19 +12,15 @@ use crate::lie::{LieGroup, SE23};
 /// A Lie group whose first nine tangent coordinates are those of SE_2(3).
 pub trait InertialState<const D: usize>: LieGroup<D> {
     /// Attitude, velocity and position.
-    #[inline]
     fn pose(&self) -> &SE23;
 
     /// Gyroscope bias, rad/s, body frame; zero where the state has none.
-    #[inline]
     fn gyro_bias(&self) -> Vector3<f64>;
 
     /// Accelerometer bias, m/s^2, body frame; zero where the state has none.
-    #[inline]
     fn accel_bias(&self) -> Vector3<f64>;
 
     /// The state with these parts; biases are dropped where the state has none.
-    #[inline]
     fn from_parts(pose: SE23, gyro_bias: Vector3<f64>, accel_bias: Vector3<f64>) -> Self;
 
     /// The state after one increment; biases stay.
@@ -40,13 +36,24 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
     /// Makes the symmetric P `F P F^T + Q`, for the transition of the error of any side; exactly symmetric.
     fn carry(transition: &Transition, p: &mut SMatrix<f64, D, D>, noise: &ImuNoise);
 
-    /// The state after one step, the transition matrix F of the left-invariant error and the
-    /// covariance Q (symmetric) that the noise of the interval adds.
+    /// Whether a step is group-affine on the whole state, so that F does not depend on the state.
+    const IS_GROUP_AFFINE: bool;
+
+    /// The state after one step, and the transition matrix F of the left-invariant error.
+    fn transition(&self, step: &ImuStep) -> (Self, SMatrix<f64, D, D>);
+
+    /// The covariance Q (symmetric) that the noise of one interval adds to the left-invariant error.
+    fn process_noise(step: &ImuStep, noise: &ImuNoise) -> SMatrix<f64, D, D>;
+
+    /// The state after one step, with F and Q.
     fn advance(
         &self,
         step: &ImuStep,
         noise: &ImuNoise,
-    ) -> (Self, SMatrix<f64, D, D>, SMatrix<f64, D, D>);
+    ) -> (Self, SMatrix<f64, D, D>, SMatrix<f64, D, D>) {
+        let (next, f) = self.transition(step);
+        (next, f, Self::process_noise(step, noise))
+    }
 
     /// The motion that the raw sample `measured` says, the biases of this state removed.
     #[inline]
@@ -101,15 +108,13 @@ impl InertialState<9> for SE23 {
         transition.carry::<9, 16>(p, noise);
     }
 
-    fn advance(
-        &self,
-        step: &ImuStep,
-        noise: &ImuNoise,
-    ) -> (Self, SMatrix<f64, 9, 9>, SMatrix<f64, 9, 9>) {
-        (
-            step.apply(self),
-            step.step.left_jacobian(),
-            step.noise_covariance(noise),
-        )
+    const IS_GROUP_AFFINE: bool = true;
+
+    fn transition(&self, step: &ImuStep) -> (Self, SMatrix<f64, 9, 9>) {
+        (step.apply(self), step.step.left_jacobian())
+    }
+
+    fn process_noise(step: &ImuStep, noise: &ImuNoise) -> SMatrix<f64, 9, 9> {
+        step.noise_covariance(noise)
     }
 }

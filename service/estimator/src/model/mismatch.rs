@@ -88,6 +88,9 @@ impl<T> Declared<T> {
 pub enum ProcessMismatch {
     /// The translation is `(1 + m) u`: slipping or deflated wheels. One parameter.
     OdometryScale,
+    /// The rotation vector is `(1 + m) log Omega`: a wheel base or a gyro's scale that is off, about every axis
+    /// alike. One parameter.
+    OdometryTurnScale,
     /// The rotation gains `m dt` about one axis of the body, m in rad/s: a gyro's bias. One parameter.
     OdometryRotationBias {
         /// Index of the axis in the rotation's tangent: 0 in the plane, 0 to 2 in space.
@@ -96,13 +99,15 @@ pub enum ProcessMismatch {
 }
 
 impl ProcessMismatch {
-    /// `d_kappa / m` of one step, D, left-invariant: `(0, Omega^T u)` for the scale, `(dt e, 0)` for the bias.
+    /// `d_kappa / m` of one step, D, left-invariant: `(0, Omega^T u)` for the scale, `(log Omega, 0)` for that of
+    /// the turn, `(dt e, 0)` for the bias.
     pub fn direction<G: RigidPose<D, N>, const D: usize, const N: usize>(
         &self,
         step: &OdometryStep<G>,
     ) -> SVector<f64, D> {
         match *self {
             Self::OdometryScale => step.scale_direction(),
+            Self::OdometryTurnScale => step.turn_direction(),
             Self::OdometryRotationBias { axis } => {
                 let mut direction = SVector::<f64, D>::zeros();
                 if axis < G::ROTATION_DIM {
@@ -137,6 +142,17 @@ impl OutputMismatch {
     pub fn source(&self) -> usize {
         match *self {
             Self::MeasurementScale { source } | Self::MeasurementRotation { source, .. } => source,
+        }
+    }
+
+    /// The same of another source.
+    #[must_use]
+    pub fn at(&self, source: usize) -> Self {
+        match *self {
+            Self::MeasurementScale { .. } => Self::MeasurementScale { source },
+            Self::MeasurementRotation { axis_w, .. } => {
+                Self::MeasurementRotation { source, axis_w }
+            }
         }
     }
 
@@ -198,21 +214,25 @@ pub(super) fn rotation_columns<const N: usize>(
     }
 }
 
-/// Most process mismatches that are followed at a time.
-pub const MAX_PROCESS_MISMATCHES: usize = 4;
+/// Most process mismatches that are followed at a time: two scales, and a bias about each of three axes.
+pub const MAX_PROCESS_MISMATCHES: usize = 5;
 
-/// How many standard deviations of its own noise a travelled way must exceed to tell of a scale.
+/// How many standard deviations of its own noise a travelled way, or a turn, must exceed to tell of a scale.
 const GATE_SIGMAS: f64 = 5.0;
 
 /// T, summed over the steps since the last update: `d <- Ad_{kappa^-1} d + d_kappa / m`.
 ///
-/// The columns are left-invariant, at the end of the last step. The scale's column is withheld while the way
-/// is below five standard deviations of the noise of the steps: standing still, its direction is noise.
+/// The columns are left-invariant, at the end of the last step. A scale's column is withheld while the way (or
+/// the turn) is below five standard deviations of the noise of the steps: standing still, or going straight on,
+/// its direction is noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProcessColumns<const D: usize> {
     declared: [Option<Declared<ProcessMismatch>>; MAX_PROCESS_MISMATCHES],
     columns: [SVector<f64, D>; MAX_PROCESS_MISMATCHES],
+    above_noise: [bool; MAX_PROCESS_MISMATCHES],
+    /// Variance of the steps' translation, m^2, and rotation, rad^2, along one axis.
     way_variance: f64,
+    turn_variance: f64,
 }
 
 impl<const D: usize> ProcessColumns<D> {
@@ -224,7 +244,9 @@ impl<const D: usize> ProcessColumns<D> {
         Some(Self {
             declared: core::array::from_fn(|i| declared.get(i).copied()),
             columns: [SVector::zeros(); MAX_PROCESS_MISMATCHES],
+            above_noise: [true; MAX_PROCESS_MISMATCHES],
             way_variance: 0.0,
+            turn_variance: 0.0,
         })
     }
 
@@ -234,14 +256,29 @@ impl<const D: usize> ProcessColumns<D> {
         step: &OdometryStep<G>,
         q: &SMatrix<f64, D, D>,
     ) {
+        let along_one = |first: usize, count: usize| {
+            let variances = (first..first + count).map(|axis| q[(axis, axis)]);
+            variances.sum::<f64>() / count as f64
+        };
+        self.way_variance += along_one(G::POSITION, N);
+        self.turn_variance += along_one(0, G::ROTATION_DIM);
         let f = step.left_jacobian();
-        for (declared, column) in self.declared.iter().zip(&mut self.columns) {
-            if let Some(declared) = declared {
-                *column = f * *column + declared.mismatch.direction(step);
-            }
+        for (i, declared) in self.declared.iter().enumerate() {
+            let Some(Declared { mismatch, .. }) = declared else {
+                continue;
+            };
+            let column = f * self.columns[i] + mismatch.direction(step);
+            let (size, variance) = match mismatch {
+                ProcessMismatch::OdometryScale => (column.norm_squared(), self.way_variance),
+                ProcessMismatch::OdometryTurnScale => {
+                    let turn = column.iter().take(G::ROTATION_DIM);
+                    (turn.map(|angle| angle * angle).sum(), self.turn_variance)
+                }
+                ProcessMismatch::OdometryRotationBias { .. } => (0.0, 0.0),
+            };
+            self.above_noise[i] = size >= GATE_SIGMAS * GATE_SIGMAS * variance;
+            self.columns[i] = column;
         }
-        let translation = (0..N).map(|axis| q[(G::POSITION + axis, G::POSITION + axis)]);
-        self.way_variance += translation.sum::<f64>() / N as f64;
     }
 
     /// The columns after two steps with no special direction: for a check at start-up. `None` as in
@@ -259,27 +296,35 @@ impl<const D: usize> ProcessColumns<D> {
     /// Forgets the way: after an update.
     pub fn reset(&mut self) {
         self.columns = [SVector::zeros(); MAX_PROCESS_MISMATCHES];
+        self.above_noise = [true; MAX_PROCESS_MISMATCHES];
         self.way_variance = 0.0;
+        self.turn_variance = 0.0;
+    }
+
+    /// Lets `remainder`, D x D of the left-invariant error, act on the columns: what an update without constraints
+    /// leaves of them, `I - K H`.
+    pub fn transform(&mut self, remainder: &SMatrix<f64, D, D>) {
+        for column in &mut self.columns {
+            *column = remainder * *column;
+        }
+    }
+
+    /// Bit i is set where the column of mismatch i stands above its noise.
+    pub fn active_bits(&self) -> u32 {
+        let declared = self.declared.iter().zip(&self.above_noise).enumerate();
+        declared
+            .filter(|(_, (declared, above_noise))| declared.is_some() && **above_noise)
+            .fold(0, |bits, (i, _)| bits | 1 << i)
     }
 
     /// The columns that stand above their noise, each with what was declared.
     pub fn active(
         &self,
     ) -> impl Iterator<Item = (Declared<ProcessMismatch>, SVector<f64, D>)> + '_ {
-        let pairs = self.declared.iter().zip(&self.columns);
-        pairs.filter_map(|(declared, column)| {
-            declared
-                .filter(|declared| self.is_above_noise(declared.mismatch, column))
-                .map(|declared| (declared, *column))
-        })
-    }
-
-    fn is_above_noise(&self, mismatch: ProcessMismatch, column: &SVector<f64, D>) -> bool {
-        match mismatch {
-            ProcessMismatch::OdometryScale => {
-                column.norm_squared() >= GATE_SIGMAS * GATE_SIGMAS * self.way_variance
-            }
-            ProcessMismatch::OdometryRotationBias { .. } => true,
-        }
+        let columns = self.declared.iter().zip(&self.columns);
+        columns
+            .zip(&self.above_noise)
+            .filter(|(_, above_noise)| **above_noise)
+            .filter_map(|((declared, column), _)| declared.map(|declared| (declared, *column)))
     }
 }

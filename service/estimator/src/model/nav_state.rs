@@ -40,6 +40,7 @@ fn pose_part(xi: &Vector15) -> SVector<f64, 9> {
 
 impl LieGroup<15> for NavState {
     const ROTATION_DIM: usize = 3;
+    const VELOCITY_DIM: usize = 3;
 
     fn identity() -> Self {
         Self::from_parts(SE23::identity(), Vector3::zeros(), Vector3::zeros())
@@ -147,17 +148,24 @@ impl InertialState<15> for NavState {
         transition.carry::<15, 22>(p, noise);
     }
 
-    fn advance(&self, step: &ImuStep, noise: &ImuNoise) -> (Self, Matrix15, Matrix15) {
-        let (pose, pose_f, pose_q) = self.pose.advance(step, noise);
+    const IS_GROUP_AFFINE: bool = false;
+
+    fn transition(&self, step: &ImuStep) -> (Self, Matrix15) {
+        let (pose, pose_f) = self.pose.transition(step);
         let mut f = with_identity_on_biases(&pose_f);
         f.fixed_view_mut::<9, 6>(0, 9)
             .copy_from(&-step.input_jacobian);
+        (Self { pose, ..*self }, f)
+    }
+
+    fn process_noise(step: &ImuStep, noise: &ImuNoise) -> Matrix15 {
         let mut q = Matrix15::zeros();
-        q.fixed_view_mut::<9, 9>(0, 0).copy_from(&pose_q);
+        q.fixed_view_mut::<9, 9>(0, 0)
+            .copy_from(&step.noise_covariance(noise));
         for axis in 0..3 {
             q[(9 + axis, 9 + axis)] = noise.gyro_bias_psd * step.dt_s;
             q[(12 + axis, 12 + axis)] = noise.accel_bias_psd * step.dt_s;
         }
-        (Self { pose, ..*self }, f, q)
+        q
     }
 }

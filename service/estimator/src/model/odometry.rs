@@ -7,6 +7,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::pose::RigidPose;
+use crate::lie::LieGroup;
 
 /// One step of odometry on the group G.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,17 +32,17 @@ impl<G> OdometryStep<G> {
     }
 
     /// `chi kappa`.
-    pub fn apply<const D: usize, const N: usize>(&self, chi: &G) -> G
+    pub fn apply<const D: usize>(&self, chi: &G) -> G
     where
-        G: RigidPose<D, N>,
+        G: LieGroup<D>,
     {
         chi.compose(&self.kappa)
     }
 
     /// F, D x D, of the left-invariant error: `Ad_{kappa^-1}`.
-    pub fn left_jacobian<const D: usize, const N: usize>(&self) -> SMatrix<f64, D, D>
+    pub fn left_jacobian<const D: usize>(&self) -> SMatrix<f64, D, D>
     where
-        G: RigidPose<D, N>,
+        G: LieGroup<D>,
     {
         self.kappa.inverse().adjoint()
     }
@@ -58,5 +59,20 @@ impl<G> OdometryStep<G> {
             direction[G::POSITION + axis] = turned[axis];
         }
         direction
+    }
+
+    /// `(log Omega, 0)`, D: how the left-invariant error grows with a relative error of the rotation, rad.
+    pub fn turn_direction<const D: usize, const N: usize>(&self) -> SVector<f64, D>
+    where
+        G: RigidPose<D, N>,
+    {
+        let kappa = self.kappa.log();
+        SVector::from_fn(|row, _| {
+            if row < G::ROTATION_DIM {
+                kappa[row]
+            } else {
+                0.0
+            }
+        })
     }
 }

@@ -1,29 +1,35 @@
 //! Mismatches carried as states: the models of odometry and of position fixes with their parameters m.
 //!
 //! ```text
-//! chi+ = chi (Omega Exp(m_b dt), (1 + m_u) u)      m+ = m + random walk
+//! chi+ = chi (Omega Exp(m_t log Omega + m_b dt), (1 + m_u) u)      m+ = m + random walk
 //! y_i  = Exp(m_r)^T ((1 + eps_i + m_s) x + R b_i)
 //! ```
 //!
 //! Linearised at the estimated parameters, not at zero: what the hard constraint of \[LC\] throws away, an
 //! augmented filter learns. The parameters lie in the state in the order of the declarations, those of the
-//! process first.
+//! process first; places that are left over mean nothing, and with a variance of zero change nothing: one P
+//! serves every set of at most P parameters.
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::augmented::Augmented;
-use super::mismatch::{OutputMismatch, ProcessMismatch, rotation_columns};
+use super::mismatch::{
+    Declared, MAX_PROCESS_MISMATCHES, OutputMismatch, ProcessMismatch, rotation_columns,
+};
 use super::observation::Observation;
 use super::observation::points::Points;
 use super::odometry::OdometryStep;
 use super::pose::{Pose, RigidPose};
 use crate::lie::{LieGroup, SO2, SO3};
 
+/// Most output mismatches that a state carries.
+pub const MAX_OUTPUT_MISMATCHES: usize = 8;
+
 /// What the parameters of an [`Augmented`] state mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unknowns<'a> {
-    process: &'a [ProcessMismatch],
-    outputs: &'a [OutputMismatch],
+pub struct Unknowns {
+    process: [Option<ProcessMismatch>; MAX_PROCESS_MISMATCHES],
+    outputs: [Option<OutputMismatch>; MAX_OUTPUT_MISMATCHES],
 }
 
 /// The transition of an augmented state over one step.
@@ -35,14 +41,72 @@ pub struct AugmentedStep<G, const D: usize> {
     pub left_jacobian: SMatrix<f64, D, D>,
 }
 
-impl<'a> Unknowns<'a> {
-    /// These mismatches, in N dimensions, as P parameters. `None` if their parameters are not P in number.
+impl Unknowns {
+    /// These mismatches, in N dimensions, as P parameters. `None` if they have more parameters than P, or are more
+    /// than [`MAX_PROCESS_MISMATCHES`] and [`MAX_OUTPUT_MISMATCHES`].
     pub fn new<const N: usize, const P: usize>(
-        process: &'a [ProcessMismatch],
-        outputs: &'a [OutputMismatch],
+        process: &[ProcessMismatch],
+        outputs: &[OutputMismatch],
     ) -> Option<Self> {
-        let of_outputs: usize = outputs.iter().map(OutputMismatch::parameters::<N>).sum();
-        (process.len() + of_outputs == P).then_some(Self { process, outputs })
+        Self::listed::<N, P>(process.iter().copied(), outputs.iter().copied())
+    }
+
+    /// The declared mismatches as P parameters, and the standard deviation of each parameter: zero where a place is
+    /// left over. `None` as in [`new`](Self::new), or if a sigma is not a finite number: of what is unknown
+    /// altogether there is no state, only a constraint.
+    pub fn declared<const N: usize, const P: usize>(
+        process: &[Declared<ProcessMismatch>],
+        outputs: &[Declared<OutputMismatch>],
+    ) -> Option<(Self, SVector<f64, P>)> {
+        let unknowns = Self::listed::<N, P>(
+            process.iter().map(|declared| declared.mismatch),
+            outputs.iter().map(|declared| declared.mismatch),
+        )?;
+        let of_process = process.iter().map(|declared| (1, declared.sigma));
+        let of_outputs = outputs
+            .iter()
+            .map(|declared| (declared.mismatch.parameters::<N>(), declared.sigma));
+        let mut sigmas = SVector::<f64, P>::zeros();
+        let mut places = sigmas.iter_mut();
+        for (count, sigma) in of_process.chain(of_outputs) {
+            for place in places.by_ref().take(count) {
+                *place = sigma;
+            }
+        }
+        let all_finite = sigmas.iter().all(|sigma| sigma.is_finite());
+        all_finite.then_some((unknowns, sigmas))
+    }
+
+    fn listed<const N: usize, const P: usize>(
+        process: impl Iterator<Item = ProcessMismatch>,
+        outputs: impl Iterator<Item = OutputMismatch>,
+    ) -> Option<Self> {
+        let mut unknowns = Self {
+            process: [None; MAX_PROCESS_MISMATCHES],
+            outputs: [None; MAX_OUTPUT_MISMATCHES],
+        };
+        let mut parameters = 0;
+        let mut places = unknowns.process.iter_mut();
+        for mismatch in process {
+            *places.next()? = Some(mismatch);
+            parameters += 1;
+        }
+        let mut places = unknowns.outputs.iter_mut();
+        for mismatch in outputs {
+            *places.next()? = Some(mismatch);
+            parameters += mismatch.parameters::<N>();
+        }
+        (parameters <= P).then_some(unknowns)
+    }
+
+    /// Whether the parameter at `index` is one of the process: of the motion, not of a measurement.
+    pub fn is_of_motion(&self, index: usize) -> bool {
+        index < self.process().count()
+    }
+
+    /// The mismatches of the process: their places are those of their parameters.
+    fn process(&self) -> impl Iterator<Item = &ProcessMismatch> {
+        self.process.iter().flatten()
     }
 
     /// The step that the measured `step` is, seen from `state`, and its transition matrix.
@@ -55,13 +119,13 @@ impl<'a> Unknowns<'a> {
         G: RigidPose<B, N>,
     {
         let (mut scale, mut turn) = (1.0, SVector::<f64, B>::zeros());
-        for (mismatch, m) in self.process.iter().zip(&state.parameters) {
-            match *mismatch {
+        for (mismatch, m) in self.process().zip(&state.parameters) {
+            match mismatch {
                 ProcessMismatch::OdometryScale => scale += m,
-                ProcessMismatch::OdometryRotationBias { axis } if axis < G::ROTATION_DIM => {
-                    turn[axis] += m * step.dt_s;
+                ProcessMismatch::OdometryTurnScale
+                | ProcessMismatch::OdometryRotationBias { .. } => {
+                    turn += mismatch.direction(step) * *m;
                 }
-                ProcessMismatch::OdometryRotationBias { .. } => {}
             }
         }
         let by_turn = G::exp(&turn);
@@ -83,11 +147,12 @@ impl<'a> Unknowns<'a> {
                 left_jacobian[(row, column)] = on_pose[(row, column)];
             }
         }
-        for (index, mismatch) in self.process.iter().enumerate() {
-            // The scale's direction belongs to the whole step, the bias's to its end.
+        for (index, mismatch) in self.process().enumerate() {
+            // The direction of the translation belongs to the whole step, those of the turn to its end.
             let direction = match mismatch {
                 ProcessMismatch::OdometryScale => turned.scale_direction(),
-                ProcessMismatch::OdometryRotationBias { .. } => {
+                ProcessMismatch::OdometryTurnScale
+                | ProcessMismatch::OdometryRotationBias { .. } => {
                     turn_jacobian * mismatch.direction(step)
                 }
             };
@@ -105,7 +170,7 @@ impl<'a> Unknowns<'a> {
     pub fn observe<const K: usize, const N: usize, const M: usize>(
         &self,
         points: Points<K, N, M>,
-    ) -> AugmentedPoints<'a, K, N, M> {
+    ) -> AugmentedPoints<K, N, M> {
         self.observe_from(0, points)
     }
 
@@ -115,25 +180,31 @@ impl<'a> Unknowns<'a> {
         &self,
         first_source: usize,
         points: Points<K, N, M>,
-    ) -> AugmentedPoints<'a, K, N, M> {
+    ) -> AugmentedPoints<K, N, M> {
+        self.observe_by(core::array::from_fn(|place| first_source + place), points)
+    }
+
+    /// `points` of these sources, as an augmented state sees them.
+    pub fn observe_by<const K: usize, const N: usize, const M: usize>(
+        &self,
+        sources: [usize; K],
+        points: Points<K, N, M>,
+    ) -> AugmentedPoints<K, N, M> {
         AugmentedPoints {
             points,
-            first_source,
-            outputs: self.outputs,
-            first: self.process.len(),
+            sources,
+            unknowns: *self,
         }
     }
 }
 
 /// Position fixes whose mismatches are in the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AugmentedPoints<'a, const K: usize, const N: usize, const M: usize> {
+pub struct AugmentedPoints<const K: usize, const N: usize, const M: usize> {
     points: Points<K, N, M>,
-    /// Which source the first of the points is of.
-    first_source: usize,
-    outputs: &'a [OutputMismatch],
-    /// Index of the first parameter of the outputs.
-    first: usize,
+    /// Which source each of the points is of.
+    sources: [usize; K],
+    unknowns: Unknowns,
 }
 
 /// The frame of a source turned by the parameters m: `Exp(m)^T`, and its right Jacobian.
@@ -170,11 +241,12 @@ impl<const N: usize> Frame<N> {
     }
 }
 
-impl<const K: usize, const N: usize, const M: usize> AugmentedPoints<'_, K, N, M> {
+impl<const K: usize, const N: usize, const M: usize> AugmentedPoints<K, N, M> {
     /// The mismatches of the point at `place` in the stack, each with the index of its first parameter.
     fn mismatches_of(&self, place: usize) -> impl Iterator<Item = (&OutputMismatch, usize)> {
-        let source = self.first_source + place;
-        let indexed = self.outputs.iter().scan(self.first, |next, mismatch| {
+        let source = self.sources[place];
+        let outputs = self.unknowns.outputs.iter().flatten();
+        let indexed = outputs.scan(self.unknowns.process().count(), |next, mismatch| {
             let index = *next;
             *next += mismatch.parameters::<N>();
             Some((mismatch, index))
@@ -213,7 +285,7 @@ impl<
     const K: usize,
     const N: usize,
     const M: usize,
-> Observation<Augmented<G, B, P, D>, D, M> for AugmentedPoints<'_, K, N, M>
+> Observation<Augmented<G, B, P, D>, D, M> for AugmentedPoints<K, N, M>
 where
     G: Pose<B, N>,
 {

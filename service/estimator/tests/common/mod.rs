@@ -4,6 +4,7 @@
 // Every test file is a crate of its own and uses a part of this.
 #![allow(dead_code)]
 
+pub mod dataset;
 pub mod drive;
 pub mod golden;
 pub mod section7;

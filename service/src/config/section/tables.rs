@@ -64,9 +64,37 @@ impl<'a> Section<'_, 'a> {
         read: impl Fn(&mut Section<'_, 'a>) -> T,
         id: impl Fn(&T) -> u32,
     ) -> Vec<T> {
+        if !self.has(name) {
+            self.known.push(name);
+            return vec![self.element(name, 0, None, read)];
+        }
+        let mut ids: Vec<u32> = Vec::new();
+        self.tables(name, limit, |section| {
+            let source = read(section);
+            let id = id(&source);
+            if section.is_sound("id") && ids.contains(&id) {
+                let problem = format!("id {id} is taken by a table above: give each its own");
+                section.contradict("id", &problem);
+            }
+            ids.push(id);
+            source
+        })
+    }
+
+    /// An array of at most `limit` tables, `[[name]]`; none by default.
+    pub(in super::super) fn tables<T>(
+        &mut self,
+        name: &'static str,
+        limit: usize,
+        mut read: impl FnMut(&mut Section<'_, 'a>) -> T,
+    ) -> Vec<T> {
         self.known.push(name);
         let tables = match self.entry(name) {
-            None => return vec![self.element(name, 0, None, &read)],
+            None => {
+                // For the schema: what such a table would hold.
+                self.element(name, 0, None, read);
+                return Vec::new();
+            }
             Some((_, DeValue::Array(tables))) => tables,
             Some((place, other)) => {
                 let (found, remedy) = (kind_of(other), format!("write [[{name}]]"));
@@ -78,11 +106,11 @@ impl<'a> Section<'_, 'a> {
                 return Vec::new();
             }
         };
-        let mut sources: Vec<T> = Vec::new();
+        let path = self.path_of(name);
+        let mut read_so_far = Vec::new();
         for (index, item) in tables.iter().enumerate() {
-            let path = format!("{}[{index}]", self.path_of(name));
             let place = Place {
-                path,
+                path: format!("{path}[{index}]"),
                 key: item.span(),
                 value: item.span(),
             };
@@ -96,20 +124,16 @@ impl<'a> Section<'_, 'a> {
                 self.walk.fault(&place, problem, None);
                 continue;
             };
-            let known_faults = self.walk.faults.len();
-            let source = self.element(name, index, Some((table, item.span().start)), &read);
-            let id_path = format!("{}.id", place.path);
-            let bad_id = self.walk.faults[known_faults..]
-                .iter()
-                .any(|fault| fault.key == id_path);
-            if !bad_id && sources.iter().any(|other| id(other) == id(&source)) {
-                self.duplicate_id(id_path, &place, table, id(&source));
-            }
-            if !bad_id {
-                sources.push(source);
-            }
+            let found = Some((table, item.span().start));
+            read_so_far.push(self.element(name, index, found, &mut read));
         }
-        sources
+        read_so_far
+    }
+
+    /// Refuses the arrays of tables `names`, where they are given, without a look into them.
+    pub(in super::super) fn refuse_unread(&mut self, names: &[&'static str], reason: &str) {
+        self.known.extend_from_slice(names);
+        self.refuse_all(names, reason);
     }
 
     /// Reads one table of an array.
@@ -132,24 +156,6 @@ impl<'a> Section<'_, 'a> {
             known,
         }
         .finish(read)
-    }
-
-    /// Notes that the table at `place` has an id that another one has.
-    fn duplicate_id(&mut self, path: String, place: &Place, table: &'a DeTable<'a>, id: u32) {
-        let problem = format!("id {id} is taken by a table above: give each its own");
-        match table.get_key_value("id") {
-            Some((key, value)) => {
-                let place = Place {
-                    path,
-                    key: key.span(),
-                    value: value.span(),
-                };
-                self.walk.fault(&place, problem, None);
-            }
-            None => self
-                .walk
-                .absence(path, Some(place.key.start), problem, None),
-        }
     }
 }
 

@@ -5,8 +5,10 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use crate::model::Unknowns;
+
 /// A hypothesis on how P mismatches behave. All sigmas are in the units of the mismatches, in the order of
-/// [`Unknowns`](crate::model::Unknowns).
+/// [`Unknowns`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode<const P: usize> {
     /// Standard deviation of the mismatches when the mode is entered; zero where they are absent.
@@ -96,6 +98,22 @@ pub struct Expected {
     pub burst_sigma: f64,
     /// Whether it is a [`ProcessMismatch`](crate::model::ProcessMismatch); else it is one of a measurement.
     pub of_motion: bool,
+}
+
+impl Expected {
+    /// What is expected of each of the P parameters of `unknowns`: these standard deviations, zero for a parameter
+    /// that means nothing.
+    pub fn of<const P: usize>(
+        unknowns: &Unknowns,
+        sigmas: &SVector<f64, P>,
+        burst_sigmas: &SVector<f64, P>,
+    ) -> [Self; P] {
+        core::array::from_fn(|k| Self {
+            sigma: sigmas[k],
+            burst_sigma: burst_sigmas[k],
+            of_motion: unknowns.is_of_motion(k),
+        })
+    }
 }
 
 /// How many modes the [`standard_modes`] bank has.

@@ -1,8 +1,13 @@
-//! Every fault is found, named by its key, and found together with the others.
+//! Every fault is found, named by its key, and found together with the others. Here those of files in general and of
+//! inertial navigation; in [`odometry`] those of the odometry models, of the estimators and of mismatches.
+
+mod odometry;
 
 use std::fs;
 
-use inekf_service::config::{Config, ConfigFaults, Fault, MAX_FILE_BYTES, WhiteNoise};
+use inekf_service::config::{
+    Config, ConfigFaults, Fault, InertialNoise, MAX_FILE_BYTES, Motion, WhiteNoise,
+};
 
 /// A sound text: the table of cases adds one fault to it at a time.
 const TOP: &str = "model = \"imu\"\n";
@@ -11,6 +16,14 @@ const NOISE: &str = "[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
 /// `top` before the first table, then the noise, then `tables`.
 fn text(top: &str, tables: &str) -> String {
     format!("{TOP}{top}\n{NOISE}{tables}\n")
+}
+
+/// The noise of inertial navigation.
+fn inertial_noise(config: &Config) -> &InertialNoise {
+    match &config.motion {
+        Motion::Inertial(inertial) => &inertial.noise,
+        Motion::Odometry(_) => panic!("{config:?}"),
+    }
 }
 
 fn faults_of(text: &str) -> Vec<Fault> {
@@ -36,7 +49,7 @@ fn assert_single(text: &str, key: &str, words: &[&str]) {
 
 #[test]
 fn each_fault_at_the_top_of_the_file() {
-    let cases: [(&str, &str, &[&str]); 17] = [
+    let cases: [(&str, &str, &[&str]); 18] = [
         (
             "gravity_mps2 = 30.1",
             "gravity_mps2",
@@ -91,7 +104,7 @@ fn each_fault_at_the_top_of_the_file() {
         (
             "estimator = \"lc-inekf\"",
             "estimator",
-            &["not built in this version", "allowed: \"inekf\""],
+            &["not built for model \"imu\"", "\"inekf\" only"],
         ),
         (
             "estimator = \"smother\"",
@@ -99,9 +112,14 @@ fn each_fault_at_the_top_of_the_file() {
             &["did you mean \"smoother\"?"],
         ),
         (
-            "invariance = \"right\"",
-            "invariance",
-            &["not built in this version", "\"left\""],
+            "estimator = \"smoother\"",
+            "estimator",
+            &["not built in this version", "\"lc-inekf\""],
+        ),
+        (
+            "mismatch = \"consider\"",
+            "mismatch",
+            &["not built for model \"imu\"", "\"none\" only"],
         ),
         (
             "gravity = 9.81",
@@ -305,11 +323,6 @@ fn each_fault_of_what_must_be_given() {
         &["must be a table", "a whole number"],
     );
     assert_single(
-        &format!("model = \"odometry2d\"\n{NOISE}"),
-        "model",
-        &["not built in this version"],
-    );
-    assert_single(
         &noise("gyro_density = 1e-3"),
         "noise.accel_density",
         &["missing", "line 2"],
@@ -386,7 +399,7 @@ fn the_ninth_source_is_one_too_many() {
 #[test]
 fn ten_faults_are_reported_as_those_ten() {
     let text = "\
-estimator = 'ekf'
+estimator = 'smoother'
 hold = 'sideways'
 gravity_mps2 = inf
 
@@ -512,7 +525,7 @@ fn other_ways_to_write_the_same_are_accepted() {
                   velocity_source = []\nposition_source = [{ id = 3 }, { id = 1 }]\n";
     let config = Config::from_toml_str(dotted, "dotted").unwrap();
     assert_eq!(
-        config.noise.white,
+        inertial_noise(&config).white,
         WhiteNoise::PerSample {
             gyro: 1.0,
             accel: 2.0
@@ -521,8 +534,11 @@ fn other_ways_to_write_the_same_are_accepted() {
     assert_eq!(config.initial.heading_rad(), -std::f64::consts::FRAC_PI_2);
     assert_eq!(config.initial.position_m, Some([1.0, 2.5, 3.0]));
     assert_eq!(config.update.iterations, 10);
-    assert_eq!(config.velocity_sources, []);
-    assert_eq!(config.heading_sources.len(), 1);
+    let Motion::Inertial(inertial) = &config.motion else {
+        panic!("{config:?}")
+    };
+    assert_eq!(inertial.velocity_sources, []);
+    assert_eq!(inertial.heading_sources.len(), 1);
     assert_eq!(
         config
             .position_sources

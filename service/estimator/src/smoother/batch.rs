@@ -1,0 +1,380 @@
+//! Smoothing of a whole trajectory by Gauss-Newton on a Lie group: \[IS\] (12)-(14), \[PAR\] (32)-(34).
+//!
+//! Each iteration linearises the cost at the trajectory, solves the linear problem exactly, and moves every state
+//! by its retraction. The parametrisation is the type S: [`Left`](crate::filter::Left) is invariant smoothing,
+//! [`Right`](crate::filter::Right) the same with errors in the world,
+//! [`Gtsam`](crate::filter::Gtsam) and [`Forster`](crate::filter::Forster) are \[IS\] (23) and (22),
+//! [`Additive`](crate::filter::Additive) the conventional smoother. Where residuals and retractions are the same but
+//! for a change of coordinates, so is the trajectory of every iteration (\[PAR\], Proposition 3): of Left and Right,
+//! and of Gtsam and Forster.
+//!
+//! With group-affine motions without noise, invariant smoothing keeps `chi_{i+1} = f_i(chi_i)` at every iteration,
+//! and stays in what the prior can reach (\[IS\], Theorem 1); the others do not.
+
+use core::marker::PhantomData;
+
+use nalgebra::{Cholesky, SVector};
+
+use super::chain::{Chain, Motion};
+use super::deviation::{Deviation, deviation};
+use super::linearise::{self, Jacobians};
+use super::solver::{SmootherError, Solver};
+use crate::filter::{Covariance, Side};
+use crate::lie::LieGroup;
+use crate::model::Observation;
+
+/// How a trajectory is smoothed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BatchOptions {
+    /// Most Gauss-Newton iterations.
+    pub iterations: usize,
+    /// Iterating stops when no component of any state moves by more than this, rad, m/s and m alike.
+    pub tolerance: f64,
+    /// Which derivatives are used.
+    pub jacobians: Jacobians,
+    /// Whether a step that raises the cost is shortened, by halves.
+    pub step_control: bool,
+}
+
+impl Default for BatchOptions {
+    /// At most 50 exact steps, down to 1e-9, none of which raises the cost.
+    fn default() -> Self {
+        Self {
+            iterations: 50,
+            tolerance: 1e-9,
+            jacobians: Jacobians::Exact,
+            step_control: true,
+        }
+    }
+}
+
+/// One Gauss-Newton iteration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// The largest component by which a state moved, rad, m/s and m alike.
+    pub largest: f64,
+    /// The share of the full step that was taken; 0 where no share of it lowers the cost.
+    pub share: f64,
+}
+
+/// What smoothing did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Smoothed {
+    /// Iterations done.
+    pub iterations: usize,
+    /// Whether the last step was below the tolerance.
+    pub converged: bool,
+}
+
+/// The minus log-likelihood of a trajectory, times two and up to a constant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cost {
+    /// The sum of the squared deviations, each in its own standard deviations.
+    pub square: f64,
+    /// The largest deviation that no noise explains: of a link without noise, or outside the prior; rad, m/s or m.
+    pub outside: f64,
+}
+
+/// What counts as no deviation at all where no noise explains one, rad, m/s and m.
+const FEASIBLE: f64 = 1e-9;
+
+/// How much larger a cost may come out by rounding, relative: the residual of an almost noise-free link is
+/// rounding, divided by a tiny standard deviation.
+const COST_ROUNDING: f64 = 1e-9;
+
+/// How many shares of a step are tried, each half of the one before.
+const MAX_TRIALS: usize = 11;
+
+/// A trajectory, and the room to smooth it in.
+///
+/// G is the group, S the parametrisation, D the dimension of the group, M that of an observation.
+#[derive(Clone, Debug)]
+pub struct Batch<G, S, const D: usize, const M: usize> {
+    states: Vec<G>,
+    trial: Vec<G>,
+    solver: Solver<D, M>,
+    parametrisation: PhantomData<S>,
+}
+
+impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> {
+    /// An empty trajectory, with room for this many states and observations. More grow the room, which allocates.
+    pub fn with_capacity(states: usize, observations: usize) -> Self {
+        Self {
+            states: Vec::with_capacity(states),
+            trial: Vec::with_capacity(states),
+            solver: Solver::with_capacity(states, observations),
+            parametrisation: PhantomData,
+        }
+    }
+
+    /// The trajectory, oldest state first.
+    pub fn states(&self) -> &[G] {
+        &self.states
+    }
+
+    /// Takes `states` as the trajectory.
+    pub fn set_states(&mut self, states: &[G]) {
+        self.states.clear();
+        self.states.extend_from_slice(states);
+    }
+
+    /// Covariance of the left-invariant error of the newest state given all observations, where the last iteration
+    /// linearised.
+    pub fn newest_covariance(&self) -> &Covariance<D> {
+        &self.solver.newest().covariance
+    }
+
+    /// Takes the prior's mean, moved without noise, as the trajectory.
+    pub fn dead_reckon<P, T, O>(&mut self, chain: &Chain<G, P, T, O, D>)
+    where
+        T: Motion<G, D>,
+    {
+        self.states.clear();
+        let mut chi = chain.prior().mean;
+        self.states.push(chi);
+        for link in chain.links() {
+            chi = link.motion.apply(&chi);
+            self.states.push(chi);
+        }
+    }
+
+    /// Iterates from the trajectory as it is.
+    ///
+    /// # Errors
+    /// [`SmootherError`]; the trajectory is then that of the last iteration that succeeded.
+    pub fn smooth<P, T, O>(
+        &mut self,
+        chain: &Chain<G, P, T, O, D>,
+        options: &BatchOptions,
+    ) -> Result<Smoothed, SmootherError>
+    where
+        P: Side,
+        T: Motion<G, D>,
+        O: Observation<G, D, M>,
+    {
+        let mut cost = self.judged(chain, options)?;
+        for iterations in 1..=options.iterations {
+            let step;
+            (step, cost) = self.step_from(chain, options, cost)?;
+            if step.largest <= options.tolerance {
+                return Ok(Smoothed {
+                    iterations,
+                    converged: true,
+                });
+            }
+        }
+        Ok(Smoothed {
+            iterations: options.iterations,
+            converged: false,
+        })
+    }
+
+    /// One Gauss-Newton iteration.
+    ///
+    /// With step control, a step is shortened by halves until the cost does not rise. Where the trajectory deviates
+    /// from what noise can explain, the step that mends that is taken whole.
+    ///
+    /// # Errors
+    /// [`SmootherError`]; the trajectory is then unchanged.
+    pub fn iterate<P, T, O>(
+        &mut self,
+        chain: &Chain<G, P, T, O, D>,
+        options: &BatchOptions,
+    ) -> Result<Step, SmootherError>
+    where
+        P: Side,
+        T: Motion<G, D>,
+        O: Observation<G, D, M>,
+    {
+        let before = self.judged(chain, options)?;
+        Ok(self.step_from(chain, options, before)?.0)
+    }
+
+    /// The cost of the trajectory, where `options` ask for step control.
+    fn judged<P, T, O>(
+        &self,
+        chain: &Chain<G, P, T, O, D>,
+        options: &BatchOptions,
+    ) -> Result<Option<Cost>, SmootherError>
+    where
+        P: Side,
+        T: Motion<G, D>,
+        O: Observation<G, D, M>,
+    {
+        if options.step_control {
+            self.cost(chain).map(Some)
+        } else {
+            Ok(None)
+        }
+    }
+
+    /// One iteration from a trajectory of the cost `before`; gives the cost after it too. Without a cost the step is
+    /// not judged.
+    fn step_from<P, T, O>(
+        &mut self,
+        chain: &Chain<G, P, T, O, D>,
+        options: &BatchOptions,
+        before: Option<Cost>,
+    ) -> Result<(Step, Option<Cost>), SmootherError>
+    where
+        P: Side,
+        T: Motion<G, D>,
+        O: Observation<G, D, M>,
+    {
+        self.linearise(chain, options.jacobians)?;
+        let steps = self.solver.solve();
+        if !steps.iter().all(|xi| xi.iter().all(|x| x.is_finite())) {
+            return Err(SmootherError::NotFinite);
+        }
+        let largest = steps
+            .iter()
+            .fold(0.0, |largest: f64, xi| largest.max(xi.amax()));
+        let mut share = 1.0;
+        for _ in 0..MAX_TRIALS {
+            self.trial.clear();
+            self.trial.extend(
+                self.states
+                    .iter()
+                    .zip(steps)
+                    .map(|(chi, xi)| moved::<G, S, D>(chi, &(xi * share))),
+            );
+            let after = match before {
+                Some(_) => Some(cost::<G, S, P, T, O, D, M>(chain, &self.trial)?),
+                None => None,
+            };
+            if acceptable(before, after) {
+                core::mem::swap(&mut self.states, &mut self.trial);
+                let step = Step {
+                    largest: share * largest,
+                    share,
+                };
+                return Ok((step, after));
+            }
+            share *= 0.5;
+        }
+        let none = Step {
+            largest: 0.0,
+            share: 0.0,
+        };
+        Ok((none, before))
+    }
+
+    /// The cost of the trajectory.
+    ///
+    /// # Errors
+    /// [`SmootherError`].
+    pub fn cost<P, T, O>(&self, chain: &Chain<G, P, T, O, D>) -> Result<Cost, SmootherError>
+    where
+        P: Side,
+        T: Motion<G, D>,
+        O: Observation<G, D, M>,
+    {
+        cost::<G, S, P, T, O, D, M>(chain, &self.states)
+    }
+
+    /// Gives the solver the problem around the trajectory.
+    fn linearise<P, T, O>(
+        &mut self,
+        chain: &Chain<G, P, T, O, D>,
+        jacobians: Jacobians,
+    ) -> Result<(), SmootherError>
+    where
+        P: Side,
+        T: Motion<G, D>,
+        O: Observation<G, D, M>,
+    {
+        check_length(&self.states, chain)?;
+        let mut sightings = chain.sightings().iter().peekable();
+        self.solver
+            .start(&linearise::prior(chain.prior(), &self.states[0], jacobians));
+        for (i, chi) in self.states.iter().enumerate() {
+            if i > 0 {
+                let (link, from) = (&chain.links()[i - 1], &self.states[i - 1]);
+                self.solver
+                    .advance(&linearise::motion::<G, S, T, D>(link, from, chi, jacobians));
+            }
+            while let Some(sighting) = sightings.next_if(|sighting| sighting.state == i) {
+                self.solver
+                    .measure(&linearise::measurement(&sighting.observation, chi))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether a step may be taken that led from one cost to another.
+fn acceptable(before: Option<Cost>, after: Option<Cost>) -> bool {
+    match (before, after) {
+        (Some(before), Some(after)) if before.outside <= FEASIBLE => {
+            after.square <= before.square * (1.0 + COST_ROUNDING)
+        }
+        // What no noise explains must be mended, whatever the rest costs; and without control nothing is judged.
+        _ => true,
+    }
+}
+
+/// Refuses a trajectory that is not one of `chain`.
+fn check_length<G, P, T, O, const D: usize>(
+    states: &[G],
+    chain: &Chain<G, P, T, O, D>,
+) -> Result<(), SmootherError> {
+    if states.len() == chain.states() {
+        return Ok(());
+    }
+    Err(SmootherError::WrongLength {
+        states: states.len(),
+        expected: chain.states(),
+    })
+}
+
+/// `chi` after the left-invariant step `xi`, by the retraction of S.
+fn moved<G: LieGroup<D>, S: Side, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
+    if S::IS_LEFT {
+        S::retract(chi, xi)
+    } else {
+        S::retract(chi, &(S::from_left(chi) * xi))
+    }
+}
+
+/// The cost of `states`, with the residuals of the links in the chart of S.
+fn cost<G, S, P, T, O, const D: usize, const M: usize>(
+    chain: &Chain<G, P, T, O, D>,
+    states: &[G],
+) -> Result<Cost, SmootherError>
+where
+    G: LieGroup<D>,
+    S: Side,
+    P: Side,
+    T: Motion<G, D>,
+    O: Observation<G, D, M>,
+{
+    check_length(states, chain)?;
+    let prior = chain.prior();
+    let mut cost = Cost {
+        square: 0.0,
+        outside: 0.0,
+    };
+    let mut add = |term: Deviation| {
+        cost.square += term.square;
+        cost.outside = cost.outside.max(term.outside);
+    };
+    let residual = P::difference(&prior.mean, &states[0]);
+    add(deviation(&residual, prior.covariance.matrix()));
+    for (link, pair) in chain.links().iter().zip(states.windows(2)) {
+        let residual = linearise::departure::<G, S, T, D>(&link.motion, &pair[0], &pair[1]);
+        add(deviation(&residual, &link.noise));
+    }
+    for sighting in chain.sightings() {
+        let residual: SVector<f64, M> = sighting.observation.residual(&states[sighting.state]);
+        let noise = Cholesky::new(sighting.observation.noise()).ok_or(
+            SmootherError::InnovationNotPositiveDefinite {
+                state: sighting.state,
+            },
+        )?;
+        add(Deviation {
+            square: residual.dot(&noise.solve(&residual)),
+            outside: 0.0,
+        });
+    }
+    Ok(cost)
+}

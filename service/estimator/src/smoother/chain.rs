@@ -1,0 +1,129 @@
+//! What a smoother is given: a chain of states of one group, a prior on the first, motions between neighbours and
+//! observations of single states.
+//!
+//! ```text
+//! chi_0 ~ prior      chi_{i+1} = f_i(chi_i) exp(w_i),  w_i ~ N(0, Q_i)      y_k = h_k(chi_{i_k}) + v_k
+//! ```
+//!
+//! Q is the covariance of the left-invariant (body) error, in the group's tangent order; Q and the covariance of
+//! the prior may be singular or zero. \[IS\] (5), with noise.
+
+use nalgebra::SMatrix;
+
+use crate::filter::Belief;
+use crate::lie::{LieGroup, SE23};
+use crate::model::{Automorphism, GroupAffineStep, ImuStep, OdometryStep};
+
+/// A motion from one state to the next.
+pub trait Motion<G: LieGroup<D>, const D: usize> {
+    /// `f(chi)`.
+    fn apply(&self, chi: &G) -> G;
+
+    /// F, D x D, with `f(chi exp(xi)) = f(chi) exp(F xi)`: exact, and the same at every `chi`, where f is
+    /// group-affine (\[IS\] (7)); to first order otherwise.
+    fn left_jacobian(&self, chi: &G) -> SMatrix<f64, D, D>;
+}
+
+impl<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize> Motion<G, D>
+    for GroupAffineStep<G, A, D>
+{
+    fn apply(&self, chi: &G) -> G {
+        Self::apply(self, chi)
+    }
+
+    fn left_jacobian(&self, _chi: &G) -> SMatrix<f64, D, D> {
+        Self::left_jacobian(self)
+    }
+}
+
+impl<G: LieGroup<D>, const D: usize> Motion<G, D> for OdometryStep<G> {
+    fn apply(&self, chi: &G) -> G {
+        Self::apply(self, chi)
+    }
+
+    fn left_jacobian(&self, _chi: &G) -> SMatrix<f64, D, D> {
+        Self::left_jacobian(self)
+    }
+}
+
+impl Motion<SE23, 9> for ImuStep {
+    fn apply(&self, chi: &SE23) -> SE23 {
+        self.step.apply(chi)
+    }
+
+    fn left_jacobian(&self, _chi: &SE23) -> SMatrix<f64, 9, 9> {
+        self.step.left_jacobian()
+    }
+}
+
+/// A motion with its noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link<T, const D: usize> {
+    /// f.
+    pub motion: T,
+    /// Q, D x D, symmetric, of the left-invariant error at the end of the motion.
+    pub noise: SMatrix<f64, D, D>,
+}
+
+/// The observation of one state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sighting<O> {
+    /// Index of the state, 0 for the first.
+    pub state: usize,
+    /// What was observed.
+    pub observation: O,
+}
+
+/// A chain that grows at its end.
+///
+/// G is the group, P the side of the prior's error, T the motion, O the observation.
+#[derive(Clone, Debug)]
+pub struct Chain<G, P, T, O, const D: usize> {
+    prior: Belief<G, P, D>,
+    links: Vec<Link<T, D>>,
+    sightings: Vec<Sighting<O>>,
+}
+
+impl<G, P, T, O, const D: usize> Chain<G, P, T, O, D> {
+    /// A chain of one state, with room for this many states and observations. More grow the room, which allocates.
+    pub fn with_capacity(prior: Belief<G, P, D>, states: usize, observations: usize) -> Self {
+        Self {
+            prior,
+            links: Vec::with_capacity(states),
+            sightings: Vec::with_capacity(observations),
+        }
+    }
+
+    /// Adds a state at the end: `chi_{n+1} = f(chi_n) exp(w)`, w of covariance `noise` (D x D, left-invariant).
+    pub fn advance(&mut self, motion: T, noise: SMatrix<f64, D, D>) {
+        self.links.push(Link { motion, noise });
+    }
+
+    /// Adds an observation of the newest state.
+    pub fn observe(&mut self, observation: O) {
+        self.sightings.push(Sighting {
+            state: self.links.len(),
+            observation,
+        });
+    }
+
+    /// The belief in the first state.
+    pub fn prior(&self) -> &Belief<G, P, D> {
+        &self.prior
+    }
+
+    /// The motions, link i from state i to state i + 1.
+    pub fn links(&self) -> &[Link<T, D>] {
+        &self.links
+    }
+
+    /// The observations, in the order of their states.
+    pub fn sightings(&self) -> &[Sighting<O>] {
+        &self.sightings
+    }
+
+    /// How many states there are; one at least.
+    pub fn states(&self) -> usize {
+        self.links.len() + 1
+    }
+}

@@ -1,0 +1,282 @@
+//! The linear core of the smoothers: a chain of Gaussian unknowns, solved in linear time without a matrix inversion
+//! but that of the innovation covariances.
+//!
+//! ```text
+//! xi_0 ~ N(m, P)      xi_{i+1} = F_i xi_i + a_i + w_i,  w_i ~ N(0, Q_i)      z_k = H_k xi_k + v_k,  v_k ~ N(0, N_k)
+//! ```
+//!
+//! Forward, a Kalman filter with innovations `e_k`, their covariances `S_k` and gains `K_k`. Backward, the adjoint
+//! `r` (Bryson and Frazier), zero behind the last measurement:
+//!
+//! ```text
+//! r_k <- r_k + H_k^T (S_k^-1 e_k - K_k^T r_k)      at a measurement
+//! r_i  = F_i^T r_{i+1}                             over a link
+//! ```
+//!
+//! Forward again, the unknowns from the smoothed disturbances (de Jong and Koopman):
+//! `xi_0 = m + P r_0`, `xi_{i+1} = F_i xi_i + a_i + Q_i r_{i+1}`. This is the minimiser of \[IS\] (14), the same as
+//! the dense \[IS\] (28), and it stays exact where P and Q are singular or zero: a link without noise holds to
+//! rounding. The normal equations, which invert P and Q, lose every digit there.
+//!
+//! Nothing allocates once the chain has had its length before.
+
+use core::fmt;
+
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
+
+use crate::filter::Covariance;
+
+/// A normal distribution of D numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian<const D: usize> {
+    /// Mean, D.
+    pub mean: SVector<f64, D>,
+    /// Covariance, D x D; may be singular.
+    pub covariance: Covariance<D>,
+}
+
+/// `xi+ = F xi + a + w`, w of covariance Q.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearMotion<const D: usize> {
+    /// F, D x D.
+    pub transition: SMatrix<f64, D, D>,
+    /// a, D.
+    pub offset: SVector<f64, D>,
+    /// Q, D x D, symmetric; may be singular or zero.
+    pub noise: SMatrix<f64, D, D>,
+}
+
+/// `z = H xi + v`, v of covariance N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearMeasurement<const D: usize, const M: usize> {
+    /// z, M.
+    pub value: SVector<f64, M>,
+    /// H, M x D.
+    pub jacobian: SMatrix<f64, M, D>,
+    /// N, M x M, symmetric positive definite.
+    pub noise: SMatrix<f64, M, M>,
+}
+
+/// Why a chain could not be solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SmootherError {
+    /// An innovation covariance is not positive definite.
+    InnovationNotPositiveDefinite {
+        /// Index of the state that the measurement is of.
+        state: usize,
+    },
+    /// The solution is not finite.
+    NotFinite,
+    /// The trajectory has not one state for every state of the chain.
+    WrongLength {
+        /// States of the trajectory.
+        states: usize,
+        /// States of the chain.
+        expected: usize,
+    },
+}
+
+impl fmt::Display for SmootherError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::InnovationNotPositiveDefinite { state } => write!(
+                formatter,
+                "the innovation covariance of a measurement of state {state} is not positive definite: check \
+                 the measurement's covariance"
+            ),
+            Self::NotFinite => formatter.write_str(
+                "the smoothed states are not finite: check the measurements and the motions between them",
+            ),
+            Self::WrongLength { states, expected } => write!(
+                formatter,
+                "the trajectory has {states} states and the chain {expected}: start from dead_reckon"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for SmootherError {}
+
+/// The gain of one measurement, and what the way back needs of it. It depends on covariances alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Gain<const D: usize, const M: usize> {
+    /// H, M x D.
+    pub jacobian: SMatrix<f64, M, D>,
+    /// K, D x M.
+    pub gain: SMatrix<f64, D, M>,
+    /// Cholesky factor of `S = H P H^T + N`.
+    pub innovation: Cholesky<f64, Const<M>>,
+}
+
+impl<const D: usize, const M: usize> Gain<D, M> {
+    /// The gain under the prior covariance `prior`, with the covariance after the measurement. `None` if the
+    /// innovation covariance is not positive definite.
+    pub fn new(
+        prior: &Covariance<D>,
+        jacobian: &SMatrix<f64, M, D>,
+        noise: &SMatrix<f64, M, M>,
+    ) -> Option<(Self, Covariance<D>)> {
+        let p_ht = prior.times_transposed(jacobian);
+        let innovation = Cholesky::new(jacobian * p_ht + noise)?;
+        let gain = innovation.solve(&p_ht.transpose()).transpose();
+        let corrected = prior.corrected(&gain, jacobian, noise);
+        let factored = Self {
+            jacobian: *jacobian,
+            gain,
+            innovation,
+        };
+        Some((factored, corrected))
+    }
+
+    /// The mean after the measured `value`, and the weighted innovation `S^-1 e`.
+    pub fn correct(
+        &self,
+        mean: &SVector<f64, D>,
+        value: &SVector<f64, M>,
+    ) -> (SVector<f64, D>, SVector<f64, M>) {
+        let innovation = value - self.jacobian * mean;
+        (
+            mean + self.gain * innovation,
+            self.innovation.solve(&innovation),
+        )
+    }
+
+    /// The adjoint before the measurement, from the one behind it and the weighted innovation.
+    pub fn adjoint(&self, behind: &SVector<f64, D>, weighted: &SVector<f64, M>) -> SVector<f64, D> {
+        behind + self.jacobian.tr_mul(&(weighted - self.gain.tr_mul(behind)))
+    }
+}
+
+/// One measurement, taken in.
+#[derive(Clone, Copy, Debug)]
+struct Taken<const D: usize, const M: usize> {
+    gain: Gain<D, M>,
+    weighted_innovation: SVector<f64, M>,
+}
+
+/// One link, taken in, with how many measurements came before it.
+#[derive(Clone, Copy, Debug)]
+struct Passed<const D: usize> {
+    motion: LinearMotion<D>,
+    measurements_before: usize,
+}
+
+/// A chain that grows at its end, filtered as it grows and smoothed on request.
+///
+/// D is the dimension of an unknown, M that of a measurement.
+#[derive(Clone, Debug)]
+pub struct Solver<const D: usize, const M: usize> {
+    prior: Gaussian<D>,
+    newest: Gaussian<D>,
+    links: Vec<Passed<D>>,
+    measurements: Vec<Taken<D, M>>,
+    /// The solution; on the way back it holds the adjoints.
+    solution: Vec<SVector<f64, D>>,
+}
+
+impl<const D: usize, const M: usize> Solver<D, M> {
+    /// A chain of one unknown, known to be zero, with room for this many. More grow the room, which allocates.
+    pub fn with_capacity(states: usize, measurements: usize) -> Self {
+        let zero = Gaussian {
+            mean: SVector::zeros(),
+            covariance: Covariance::from_variances(&SVector::zeros()),
+        };
+        Self {
+            prior: zero,
+            newest: zero,
+            links: Vec::with_capacity(states),
+            measurements: Vec::with_capacity(measurements),
+            solution: Vec::with_capacity(states),
+        }
+    }
+
+    /// Begins a new chain, of one unknown with this prior.
+    pub fn start(&mut self, prior: &Gaussian<D>) {
+        self.prior = *prior;
+        self.newest = *prior;
+        self.links.clear();
+        self.measurements.clear();
+    }
+
+    /// Takes in a measurement of the newest unknown.
+    ///
+    /// # Errors
+    /// [`SmootherError::InnovationNotPositiveDefinite`]; the chain is then as it was.
+    pub fn measure(&mut self, measurement: &LinearMeasurement<D, M>) -> Result<(), SmootherError> {
+        let (gain, covariance) = Gain::new(
+            &self.newest.covariance,
+            &measurement.jacobian,
+            &measurement.noise,
+        )
+        .ok_or(SmootherError::InnovationNotPositiveDefinite {
+            state: self.links.len(),
+        })?;
+        let (mean, weighted_innovation) = gain.correct(&self.newest.mean, &measurement.value);
+        self.newest = Gaussian { mean, covariance };
+        self.measurements.push(Taken {
+            gain,
+            weighted_innovation,
+        });
+        Ok(())
+    }
+
+    /// Adds an unknown at the end.
+    pub fn advance(&mut self, motion: &LinearMotion<D>) {
+        self.newest = Gaussian {
+            mean: motion.transition * self.newest.mean + motion.offset,
+            covariance: self
+                .newest
+                .covariance
+                .transformed(&motion.transition)
+                .plus(&motion.noise),
+        };
+        self.links.push(Passed {
+            motion: *motion,
+            measurements_before: self.measurements.len(),
+        });
+    }
+
+    /// The newest unknown given all measurements: its smoothed and filtered distribution.
+    pub fn newest(&self) -> &Gaussian<D> {
+        &self.newest
+    }
+
+    /// The minimiser, one D-vector for each unknown, oldest first.
+    pub fn solve(&mut self) -> &[SVector<f64, D>] {
+        self.solution.clear();
+        let mut adjoint = SVector::zeros();
+        let mut unseen = self.measurements.as_slice();
+        for link in self.links.iter().rev() {
+            let (before, of_this) = unseen.split_at(link.measurements_before);
+            adjoint = through(of_this, &adjoint);
+            self.solution.push(adjoint);
+            adjoint = link.motion.transition.tr_mul(&adjoint);
+            unseen = before;
+        }
+        self.solution.push(through(unseen, &adjoint));
+        self.solution.reverse();
+
+        let mut smoothed = self.solution.iter_mut();
+        let Some(first) = smoothed.next() else {
+            return &[];
+        };
+        let mut unknown = self.prior.mean + self.prior.covariance.matrix() * *first;
+        *first = unknown;
+        for (entry, link) in smoothed.zip(&self.links) {
+            let motion = &link.motion;
+            unknown = motion.transition * unknown + motion.offset + motion.noise * *entry;
+            *entry = unknown;
+        }
+        &self.solution
+    }
+}
+
+/// The adjoint before the `measurements` of one unknown, from the one behind them.
+fn through<const D: usize, const M: usize>(
+    measurements: &[Taken<D, M>],
+    behind: &SVector<f64, D>,
+) -> SVector<f64, D> {
+    measurements.iter().rev().fold(*behind, |adjoint, taken| {
+        taken.gain.adjoint(&adjoint, &taken.weighted_innovation)
+    })
+}

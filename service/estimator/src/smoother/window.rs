@@ -1,0 +1,439 @@
+//! A smoother over the newest W states, \[IS\] section V: what leaves the window is marginalised into a prior.
+//!
+//! States `chi_i` on SE_2(3), without or with biases; [`Preintegration`] leads from one to the next, a [`Fix`]
+//! sees some of them. An update linearises prior, motions and fixes at the estimates and solves
+//! \[IS\] (14) in left-invariant coordinates, Kalman forward, disturbance smoother backward: only innovation
+//! covariances are inverted, so that Q = 0 and singular priors are exact. The estimates move by the retraction of
+//! side S: [`Left`] is invariant smoothing, [`Right`](crate::filter::Right) its other side,
+//! [`Gtsam`](crate::filter::Gtsam) and [`Forster`](crate::filter::Forster) are \[IS\] (23) and (22).
+//!
+//! Where nothing that enters the covariances depends on the estimate, the gains are constants, and the recursion of
+//! the covariance is the left-invariant Kalman filter's: one covariance step for each new state, and a few
+//! matrix-vector products for each state of the window and iteration. That holds for a state without biases, with
+//! a prior of frozen covariance ([`PriorForm`]), the Jacobian of the motion's residual left out, a parametrisation
+//! that is left-invariant to first order, and fixes with equal noise on all axes. Everything else is
+//! linearised anew at each iteration; the window sees by itself which it is.
+//!
+//! All memory is taken at construction. A second fix of one moment is a state of its own, at the end of a
+//! motion of no length: [`Preintegration::new`], pushed as it is.
+
+use core::fmt;
+use core::marker::PhantomData;
+use std::collections::VecDeque;
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::filter::{Belief, Covariance, Left, Side, Verdict};
+use crate::model::InertialState;
+use crate::smoother::{Gaussian, Jacobians, Preintegration};
+
+mod fix;
+mod knot;
+mod prior;
+mod track;
+
+use knot::{Knot, Passage};
+use prior::Prior;
+use track::Track;
+
+pub use fix::Fix;
+pub use prior::PriorForm;
+
+/// How a window is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WindowOptions {
+    /// W, the most states that the window holds; at least 1.
+    pub capacity: usize,
+    /// Gauss-Newton iterations for each update; at least 1.
+    pub iterations: usize,
+    /// The form of the prior that the window begins with.
+    pub first_prior: PriorForm,
+    /// The form of the priors that marginalisation leaves.
+    pub prior: PriorForm,
+    /// The derivatives of the motions' residuals.
+    pub jacobians: Jacobians,
+    /// An innovation with a larger normalised square than this is refused; infinity accepts all.
+    pub gate: f64,
+}
+
+impl WindowOptions {
+    /// One iteration, frozen covariances, no gate: the gains are constants wherever the state allows it.
+    pub const fn new(capacity: usize) -> Self {
+        Self {
+            capacity,
+            iterations: 1,
+            first_prior: PriorForm::GroupMean,
+            prior: PriorForm::GroupMean,
+            jacobians: Jacobians::Frozen,
+            gate: f64::INFINITY,
+        }
+    }
+}
+
+/// What an update did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WindowCorrection {
+    /// Whether the fix was used.
+    pub verdict: Verdict,
+    /// Normalised innovation squared of the new fix given all before it: chi-square with 3 degrees of freedom.
+    pub nis: f64,
+    /// Gauss-Newton iterations done.
+    pub iterations: usize,
+}
+
+/// Why an update could not be done; the window is unchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WindowError {
+    /// The newest state has been seen already.
+    AlreadySeen,
+    /// An innovation covariance is not positive definite: a noise that is not, or a broken prior.
+    InnovationNotPositiveDefinite,
+    /// The corrected states are not finite.
+    NotFinite,
+}
+
+impl fmt::Display for WindowError {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::AlreadySeen => {
+                "the newest state of the window has a measurement already: push the motion to the next one, \
+                 or a motion of no length"
+            }
+            Self::InnovationNotPositiveDefinite => {
+                "the innovation covariance is not positive definite: check the measurement's covariance"
+            }
+            Self::NotFinite => "the smoothed states are not finite: check the measurement",
+        })
+    }
+}
+
+impl core::error::Error for WindowError {}
+
+/// The newest states of a trajectory, smoothed.
+#[derive(Clone, Debug)]
+pub struct Window<G, S, const D: usize> {
+    options: WindowOptions,
+    prior: Prior<G, D>,
+    /// Oldest first; never empty.
+    knots: VecDeque<Knot<G, D>>,
+    /// Of the same states.
+    passages: VecDeque<Passage<G, D>>,
+    /// How many fixes in the window have noise that differs by direction.
+    anisotropic: usize,
+    /// Whether the gains that are stored are those of terms which do not depend on the estimate.
+    gains_hold: bool,
+    side: PhantomData<S>,
+}
+
+impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
+    /// A window that holds one state, with `first` as its prior. The only place that allocates.
+    pub fn new(first: &Belief<G, Left, D>, options: &WindowOptions) -> Self {
+        let options = WindowOptions {
+            capacity: options.capacity.max(1),
+            iterations: options.iterations.max(1),
+            ..*options
+        };
+        let mut window = Self {
+            options,
+            prior: Self::first_prior(first, &options),
+            knots: VecDeque::with_capacity(options.capacity),
+            passages: VecDeque::with_capacity(options.capacity),
+            anisotropic: 0,
+            gains_hold: false,
+            side: PhantomData,
+        };
+        window.restart(first);
+        window
+    }
+
+    /// Forgets all states and begins again with `first`.
+    pub fn restart(&mut self, first: &Belief<G, Left, D>) {
+        self.prior = Self::first_prior(first, &self.options);
+        self.knots.clear();
+        self.passages.clear();
+        let passage = Passage {
+            motion: Preintegration::new(&first.mean),
+            transition: SMatrix::identity(),
+            predicted: first.covariance,
+        };
+        let track = Track::new(&passage.motion.motion().step);
+        let knot = Knot::new(first.mean, track, &first.covariance);
+        self.knots.push_back(knot);
+        self.passages.push_back(passage);
+        self.anisotropic = 0;
+        self.gains_hold = self.is_constant();
+    }
+
+    fn first_prior(first: &Belief<G, Left, D>, options: &WindowOptions) -> Prior<G, D> {
+        let at_its_mean = Gaussian {
+            mean: SVector::zeros(),
+            covariance: first.covariance,
+        };
+        Prior::new::<S>(options.first_prior, &first.mean, &at_its_mean)
+    }
+
+    /// Adds the state at the end of `motion`. If the window is full its oldest state leaves first, and its last
+    /// estimate, smoothed by all fixes since, is returned.
+    pub fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
+        let newest = self.newest_knot();
+        let track = Track::new(&motion.motion().step);
+        let (chi, transition, predicted) = if self.is_affine() {
+            let predicted = track.carry_covariance(&newest.filtered, motion.noise());
+            (track.apply(&newest.chi), SMatrix::identity(), predicted)
+        } else {
+            let (chi, transition) = motion.transition(&newest.chi);
+            let carried = newest.filtered.transformed(&transition);
+            (chi, transition, carried.plus(motion.noise().matrix()))
+        };
+        let mut passage = Passage {
+            motion: *motion,
+            transition,
+            predicted,
+        };
+        let knot = Knot::new(chi, track, &predicted);
+        let left = self
+            .is_full()
+            .then(|| self.marginalise(&knot, &mut passage));
+        self.knots.push_back(knot);
+        self.passages.push_back(passage);
+        left
+    }
+
+    /// Removes the oldest state; what is known from it becomes the prior of the next one, which is the given one if
+    /// the window is empty then. Gives its estimate.
+    fn marginalise(&mut self, knot: &Knot<G, D>, passage: &mut Passage<G, D>) -> G {
+        let (fresh, affine) = (self.must_linearise(), self.is_affine());
+        let first = &mut self.knots[0];
+        if fresh {
+            let prior = self.prior.at::<S>(&first.chi);
+            // It was positive definite at the last update, if there is a fix.
+            first.weigh(&prior.covariance);
+            first.correct(prior.mean);
+        } else {
+            let wanted = self.prior.mean_at::<S>(&first.chi);
+            first.correct(wanted);
+        }
+        let (left, mean, filtered) = (first.chi, first.correction, first.filtered);
+        self.anisotropic -= usize::from(first.fix.is_some_and(|fix| !fix.is_isotropic()));
+        self.knots.pop_front();
+        self.passages.pop_front();
+
+        let (next, passage) = match (self.knots.front(), self.passages.front_mut()) {
+            (Some(next), Some(passage)) => (next, passage),
+            _ => (knot, passage),
+        };
+        let mean = if affine {
+            if fresh {
+                passage.predicted = next
+                    .track
+                    .carry_covariance(&filtered, passage.motion.noise());
+            }
+            next.track.carry(&mean) + next.offset::<S>(&left)
+        } else {
+            let offset = passage.link::<S>(&left, &next.chi, &filtered, self.options.jacobians);
+            passage.transition * mean + offset
+        };
+        let correction = Gaussian {
+            mean,
+            covariance: passage.predicted,
+        };
+        self.prior = Prior::new::<S>(self.options.prior, &next.chi, &correction);
+        left
+    }
+
+    /// Takes in a fix of the newest state and smooths the window.
+    ///
+    /// # Errors
+    /// [`WindowError`]; the states are then unchanged, as they are when the fix is gated.
+    pub fn update(&mut self, fix: impl Into<Fix>) -> Result<WindowCorrection, WindowError> {
+        let fix = fix.into();
+        let last = self.knots.len() - 1;
+        if self.knots[last].fix.is_some() {
+            return Err(WindowError::AlreadySeen);
+        }
+        self.knots[last].fix = Some(fix);
+        self.anisotropic += usize::from(!fix.is_isotropic());
+        let passage = self.must_linearise().then(|| self.passages[last]);
+        let mut steps = 0;
+        let outcome = self.iterate(&mut steps);
+        if !matches!(outcome, Ok(correction) if correction.verdict == Verdict::Accepted) {
+            self.anisotropic -= usize::from(!fix.is_isotropic());
+            if let Some(passage) = passage {
+                self.passages[last] = passage;
+            }
+            self.knots[last].unsee(&self.passages[last]);
+            if steps > 0 {
+                for knot in &mut self.knots {
+                    knot.chi = knot.before;
+                }
+            }
+        }
+        outcome
+    }
+
+    /// Gauss-Newton; counts the steps that moved the states.
+    fn iterate(&mut self, steps: &mut usize) -> Result<WindowCorrection, WindowError> {
+        let mut correction = WindowCorrection {
+            verdict: Verdict::Accepted,
+            nis: f64::NAN,
+            iterations: self.options.iterations,
+        };
+        while *steps < self.options.iterations {
+            self.forward()?;
+            if *steps == 0 {
+                let newest = self.newest_knot();
+                correction.nis = newest.innovation.dot(&newest.weighted);
+                if !correction.nis.is_finite() {
+                    return Err(WindowError::NotFinite);
+                }
+                if correction.nis > self.options.gate {
+                    correction.verdict = Verdict::Gated;
+                    correction.iterations = 0;
+                    return Ok(correction);
+                }
+            }
+            *steps += 1;
+            self.backward(*steps == 1)?;
+        }
+        Ok(correction)
+    }
+
+    /// The Kalman filter over the linearised window.
+    fn forward(&mut self) -> Result<(), WindowError> {
+        let fresh = self.must_linearise();
+        let constant = self.is_constant();
+        let affine = self.is_affine();
+        let jacobians = self.options.jacobians;
+        let last = self.knots.len() - 1;
+        let mut before: Option<(G, SVector<f64, D>)> = None;
+        let mut filtered = self.knots[0].filtered;
+        let states = self.knots.iter_mut().zip(&mut self.passages);
+        for (index, (knot, passage)) in states.enumerate() {
+            let mean = match &before {
+                None if fresh => {
+                    let prior = self.prior.at::<S>(&knot.chi);
+                    passage.predicted = prior.covariance;
+                    prior.mean
+                }
+                None => self.prior.mean_at::<S>(&knot.chi),
+                Some((chi, correction)) if affine => {
+                    if fresh {
+                        let noise = passage.motion.noise();
+                        passage.predicted = knot.track.carry_covariance(&filtered, noise);
+                    }
+                    knot.track.carry(correction) + knot.offset::<S>(chi)
+                }
+                Some((chi, correction)) => {
+                    let offset = passage.link::<S>(chi, &knot.chi, &filtered, jacobians);
+                    passage.transition * correction + offset
+                }
+            };
+            if fresh || index == last {
+                if !knot.weigh(&passage.predicted) {
+                    self.gains_hold = false;
+                    return Err(WindowError::InnovationNotPositiveDefinite);
+                }
+                filtered = knot.filtered;
+            }
+            knot.correct(mean);
+            before = Some((knot.chi, knot.correction));
+        }
+        self.gains_hold = constant;
+        Ok(())
+    }
+
+    /// The disturbance smoother, and the step of all estimates; the `first` of an update keeps what they were.
+    fn backward(&mut self, first: bool) -> Result<(), WindowError> {
+        let affine = self.is_affine();
+        let mut adjoint = SVector::<f64, D>::zeros();
+        let mut sum = 0.0;
+        for (knot, passage) in self.knots.iter_mut().zip(&self.passages).rev() {
+            let start = knot.smooth(adjoint);
+            sum += knot.correction.sum();
+            adjoint = if affine {
+                knot.track.carry_back(&start)
+            } else {
+                passage.transition.tr_mul(&start)
+            };
+            let xi = if S::IS_LEFT {
+                knot.correction
+            } else {
+                S::from_left(&knot.chi) * knot.correction
+            };
+            if first {
+                knot.before = knot.chi;
+            }
+            knot.chi = S::retract(&knot.chi, &xi);
+        }
+        if sum.is_finite() {
+            Ok(())
+        } else {
+            Err(WindowError::NotFinite)
+        }
+    }
+
+    /// Whether the linearised motions are the same at all estimates, but for their offsets.
+    fn is_affine(&self) -> bool {
+        G::IS_GROUP_AFFINE && S::Residual::IS_LEFT && self.options.jacobians == Jacobians::Frozen
+    }
+
+    /// Whether nothing that enters the covariances depends on the estimates.
+    fn is_constant(&self) -> bool {
+        self.is_affine() && self.anisotropic == 0 && self.prior.is_constant::<S>()
+    }
+
+    fn must_linearise(&self) -> bool {
+        !(self.gains_hold && self.is_constant())
+    }
+
+    fn newest_knot(&self) -> &Knot<G, D> {
+        &self.knots[self.knots.len() - 1]
+    }
+
+    /// The newest state, with the covariance of its left-invariant error given all fixes, as linearised at the
+    /// last update.
+    pub fn newest(&self) -> Belief<G, Left, D> {
+        let newest = self.newest_knot();
+        Belief::new(newest.chi, newest.filtered)
+    }
+
+    /// The estimates of all states, oldest first.
+    pub fn states(&self) -> impl ExactSizeIterator<Item = &G> + DoubleEndedIterator {
+        self.knots.iter().map(|knot| &knot.chi)
+    }
+
+    /// How many states the window holds.
+    pub fn len(&self) -> usize {
+        self.knots.len()
+    }
+
+    /// Whether the window holds no state: never.
+    pub fn is_empty(&self) -> bool {
+        self.knots.is_empty()
+    }
+
+    /// Whether the next push makes the oldest state leave.
+    pub fn is_full(&self) -> bool {
+        self.knots.len() >= self.options.capacity
+    }
+
+    /// State `index`, oldest 0, with the covariance of its left-invariant error given all fixes, before and
+    /// after; `None` beyond the newest. Matrix products for each later state: for reports, not for each sample.
+    pub fn smoothed(&self, index: usize) -> Option<Belief<G, Left, D>> {
+        let knot = self.knots.get(index)?;
+        let mut information = SMatrix::<f64, D, D>::zeros();
+        let later = self.knots.range(index + 1..);
+        for (later, passage) in later.zip(self.passages.range(index + 1..)).rev() {
+            let start = later.information(&information);
+            let transition = if self.is_affine() {
+                later.track.matrix()
+            } else {
+                passage.transition
+            };
+            information = transition.tr_mul(&start) * transition;
+        }
+        let p = knot.filtered.matrix();
+        let covariance = Covariance::from_upper(p - p * information * p);
+        Some(Belief::new(knot.chi, covariance))
+    }
+}

@@ -1,0 +1,190 @@
+//! One state of the window, with the motion that led to it, what saw it, and its gains.
+//!
+//! All in left-invariant coordinates at the estimate of the last solve.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::Fix;
+use super::track::Track;
+use crate::filter::{Covariance, Side};
+use crate::model::InertialState;
+use crate::smoother::linearise;
+use crate::smoother::{Jacobians, Link, Preintegration};
+
+/// What the passes need of a fix beyond the fix.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FixGain<const D: usize> {
+    /// K, D x 3.
+    pub gain: SMatrix<f64, D, 3>,
+    /// Inverse of the innovation covariance.
+    pub weight: Matrix3<f64>,
+}
+
+/// How a state was reached: what is read only where gains are computed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Passage<G, const D: usize> {
+    /// The motion from the state before; without meaning for the oldest state.
+    pub motion: Preintegration<G, D>,
+    /// F of the motion, where it is not group-affine with frozen Jacobians: there the track has it.
+    pub transition: SMatrix<f64, D, D>,
+    /// Covariance given all that was before this state.
+    pub predicted: Covariance<D>,
+}
+
+impl<G: InertialState<D>, const D: usize> Passage<G, D> {
+    /// The motion from `before` to `chi` linearised anew: keeps F, and the covariance after it from the `filtered`
+    /// one before it. Gives the offset.
+    pub fn link<S: Side>(
+        &mut self,
+        before: &G,
+        chi: &G,
+        filtered: &Covariance<D>,
+        jacobians: Jacobians,
+    ) -> SVector<f64, D> {
+        let link = Link {
+            motion: self.motion,
+            noise: *self.motion.noise().matrix(),
+        };
+        let linear = linearise::motion::<G, S, _, D>(&link, before, chi, jacobians);
+        self.transition = linear.transition;
+        self.predicted = filtered.transformed(&linear.transition).plus(&linear.noise);
+        linear.offset
+    }
+}
+
+/// A state, with what every pass over the window reads.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Knot<G, const D: usize> {
+    /// The estimate.
+    pub chi: G,
+    /// The estimate before the update that is under way.
+    pub before: G,
+    /// The motion from the state before, if it is group-affine.
+    pub track: Track,
+    pub fix: Option<Fix>,
+    /// Present if there is a fix and its gain has been computed.
+    gain: Option<FixGain<D>>,
+    /// Covariance given all up to this state.
+    pub filtered: Covariance<D>,
+
+    /// On the way forward the filtered correction, on the way back the smoothed one.
+    pub correction: SVector<f64, D>,
+    /// Innovation, and the same times the inverse of its covariance.
+    pub innovation: Vector3<f64>,
+    pub weighted: Vector3<f64>,
+}
+
+impl<G: InertialState<D>, const D: usize> Knot<G, D> {
+    /// A state that nothing has seen yet, at the end of `track`.
+    pub fn new(chi: G, track: Track, predicted: &Covariance<D>) -> Self {
+        Self {
+            chi,
+            before: chi,
+            track,
+            fix: None,
+            filtered: *predicted,
+            gain: None,
+            correction: SVector::zeros(),
+            innovation: Vector3::zeros(),
+            weighted: Vector3::zeros(),
+        }
+    }
+
+    /// Takes the fix back.
+    pub fn unsee(&mut self, passage: &Passage<G, D>) {
+        self.fix = None;
+        self.gain = None;
+        self.filtered = passage.predicted;
+    }
+
+    /// The offset of a group-affine motion from `before`, `xi = F xi_before + offset + w`, with frozen Jacobians:
+    /// minus `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
+    pub fn offset<S: Side>(&self, before: &G) -> SVector<f64, D> {
+        -S::Residual::difference(&self.track.apply(before), &self.chi)
+    }
+
+    /// The gain, and the covariance after the fix. `false` if the innovation covariance is not positive
+    /// definite.
+    pub fn weigh(&mut self, predicted: &Covariance<D>) -> bool {
+        let Some(fix) = &self.fix else {
+            self.gain = None;
+            self.filtered = *predicted;
+            return true;
+        };
+        let noise = fix.covariance_b(&self.chi);
+        let h = fix.jacobian();
+        let p_ht = predicted.times_transposed(&h);
+        let mut innovation = noise;
+        for axis in 0..3 {
+            innovation +=
+                fix.seen(&p_ht.column(axis).into_owned()) * Vector3::ith(axis, 1.0).transpose();
+        }
+        let Some(weight) = inverse(&innovation) else {
+            return false;
+        };
+        let gain = p_ht * weight;
+        self.filtered = predicted.corrected(&gain, &h, &noise);
+        self.gain = Some(FixGain { gain, weight });
+        true
+    }
+
+    /// The filtered correction from the `predicted` one.
+    pub fn correct(&mut self, predicted: SVector<f64, D>) {
+        self.correction = predicted;
+        if let (Some(fix), Some(gain)) = (&self.fix, &self.gain) {
+            self.innovation = fix.residual_b(&self.chi) - fix.seen(&predicted);
+            self.weighted = gain.weight * self.innovation;
+            self.correction += gain.gain * self.innovation;
+        }
+    }
+
+    /// The smoothed correction, from the adjoint at the end of this state; gives the adjoint at its beginning.
+    pub fn smooth(&mut self, adjoint: SVector<f64, D>) -> SVector<f64, D> {
+        self.correction += self.filtered.matrix() * adjoint;
+        match (&self.fix, &self.gain) {
+            (Some(fix), Some(gain)) => {
+                let weight = self.weighted - gain.gain.tr_mul(&adjoint);
+                fix.add_transposed(adjoint, &weight)
+            }
+            _ => adjoint,
+        }
+    }
+
+    /// The information matrix at the beginning of this state, from that at its end.
+    pub fn information(&self, end: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+        match (&self.fix, &self.gain) {
+            (Some(fix), Some(gain)) => {
+                let h = fix.jacobian::<D>();
+                let rest = SMatrix::identity() - gain.gain * h;
+                rest.transpose() * end * rest + h.transpose() * gain.weight * h
+            }
+            _ => *end,
+        }
+    }
+}
+
+/// The inverse of a symmetric matrix by its Cholesky factor; `None` if it is not positive definite.
+fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    // The factor's rows, their diagonal inverted.
+    let root = |square: f64| (square > 0.0).then(|| 1.0 / square.sqrt());
+    let d0 = root(s[(0, 0)])?;
+    let (l10, l20) = (s[(1, 0)] * d0, s[(2, 0)] * d0);
+    let d1 = root(s[(1, 1)] - l10 * l10)?;
+    let l21 = (s[(2, 1)] - l20 * l10) * d1;
+    let d2 = root(s[(2, 2)] - l20 * l20 - l21 * l21)?;
+    // The inverse of the factor, of which the inverse is the square.
+    let (i10, i21) = (-l10 * d0 * d1, -l21 * d1 * d2);
+    let i20 = -(l20 * d0 + l21 * i10) * d2;
+    let (m01, m02, m12) = (i10 * d1 + i20 * i21, i20 * d2, i21 * d2);
+    Some(Matrix3::new(
+        d0 * d0 + i10 * i10 + i20 * i20,
+        m01,
+        m02,
+        m01,
+        d1 * d1 + i21 * i21,
+        m12,
+        m02,
+        m12,
+        d2 * d2,
+    ))
+}

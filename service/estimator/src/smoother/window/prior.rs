@@ -1,0 +1,102 @@
+//! What the window remembers of the states that have left it: a prior on its oldest state.
+//!
+//! Marginalisation gives, at the estimate `chi_lin` of that moment, a correction of mean m and covariance P (in the
+//! coordinates of side S). The estimate moves on, and the prior must be said anew at each `chi_hat`:
+//!
+//! | form | residual p at `chi_hat` | covariance |
+//! |---|---|---|
+//! | [`GroupMean`](PriorForm::GroupMean) | `chi_hat - chi_bar`, with `chi_bar = chi_lin + m` | P, frozen |
+//! | [`Linear`](PriorForm::Linear) | `(chi_hat - chi_lin) - m`, \[PAR\] (41) | P, frozen |
+//! | [`Recentred`](PriorForm::Recentred) | as the first | carried to `chi_bar`, then to `chi_hat`: \[IS\] (14) |
+//!
+//! where + and - are the retraction of S and its inverse: for [`Left`](crate::filter::Left) the residual of the first
+//! is `log(chi_bar^-1 chi_hat)`. With the covariance frozen the gains of the window do not depend on the estimate.
+
+use nalgebra::SVector;
+
+use crate::filter::{Covariance, Side};
+use crate::lie::LieGroup;
+use crate::smoother::Gaussian;
+
+/// How a prior follows the estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PriorForm {
+    /// A mean on the group, and a frozen covariance.
+    GroupMean,
+    /// A mean in the coordinates at the point of marginalisation, and a frozen covariance.
+    Linear,
+    /// A mean on the group, and a covariance that the exact Jacobians carry along. It leaks information: after
+    /// marginalisation under a wrong heading, the heading counts as known better than it is.
+    Recentred,
+}
+
+/// A prior on one state. Its covariance is in the coordinates of the side S that made it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior<G, const D: usize> {
+    form: PriorForm,
+    /// `chi_bar`, or `chi_lin` for the linear form.
+    anchor: G,
+    /// m for the linear form, else zero.
+    offset: SVector<f64, D>,
+    covariance: Covariance<D>,
+}
+
+impl<G: LieGroup<D>, const D: usize> Prior<G, D> {
+    /// The prior of this form from a correction of `chi_lin` in left-invariant coordinates.
+    pub(super) fn new<S: Side>(form: PriorForm, chi_lin: &G, left: &Gaussian<D>) -> Self {
+        let (mean, covariance) = if S::IS_LEFT {
+            (left.mean, left.covariance)
+        } else {
+            let from_left = S::from_left(chi_lin);
+            (
+                from_left * left.mean,
+                left.covariance.transformed(&from_left),
+            )
+        };
+        let on_group = || S::retract(chi_lin, &mean);
+        let (anchor, offset, covariance) = match form {
+            PriorForm::GroupMean => (on_group(), SVector::zeros(), covariance),
+            PriorForm::Linear => (*chi_lin, mean, covariance),
+            PriorForm::Recentred => {
+                let carried = covariance.transformed(&S::jacobian::<G, D>(&mean));
+                (on_group(), SVector::zeros(), carried)
+            }
+        };
+        Self {
+            form,
+            anchor,
+            offset,
+            covariance,
+        }
+    }
+
+    /// Whether the covariance at an estimate does not depend on the estimate.
+    pub(super) fn is_constant<S: Side>(&self) -> bool {
+        S::IS_LEFT && self.form != PriorForm::Recentred
+    }
+
+    /// The mean, in left-invariant coordinates, of the correction that the prior wants at `chi`: minus its residual.
+    /// For priors that [are constant](Self::is_constant).
+    pub(super) fn mean_at<S: Side>(&self, chi: &G) -> SVector<f64, D> {
+        self.offset - S::difference(&self.anchor, chi)
+    }
+
+    /// The correction that the prior wants at `chi`, in left-invariant coordinates.
+    pub(super) fn at<S: Side>(&self, chi: &G) -> Gaussian<D> {
+        let wanted = self.mean_at::<S>(chi);
+        if self.is_constant::<S>() {
+            return Gaussian {
+                mean: wanted,
+                covariance: self.covariance,
+            };
+        }
+        let mut to_left = S::to_left(chi);
+        if self.form == PriorForm::Recentred {
+            to_left *= S::jacobian::<G, D>(&-wanted);
+        }
+        Gaussian {
+            mean: to_left * wanted,
+            covariance: self.covariance.transformed(&to_left),
+        }
+    }
+}

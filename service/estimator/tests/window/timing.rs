@@ -1,0 +1,79 @@
+//! What a new state and its fix cost, by size of the window: printed, not asserted.
+
+use inekf::filter::{Belief, Left};
+use inekf::lie::SE23;
+use inekf::model::{
+    Discretisation, ImuInput, ImuNoise, InertialState, NavState, PositionObservation,
+};
+use inekf::smoother::{Preintegration, Window, WindowOptions};
+use nalgebra::{Matrix3, Vector3};
+use std::hint::black_box;
+use std::time::Instant;
+
+use crate::common::{GRAVITY_W, NOISE, any_belief, normal, seeded};
+
+/// The least mean time of a push and an update over some blocks, s, in a window that is full.
+fn cost_s<G: InertialState<D>, const D: usize>(capacity: usize, covariance_w: Matrix3<f64>) -> f64 {
+    let mut rng = seeded(1);
+    let noise = ImuNoise { ..NOISE };
+    let start = G::from_parts(
+        SE23 {
+            velocity: Vector3::new(10.0, 0.0, 0.0),
+            ..inekf::lie::LieGroup::identity()
+        },
+        Vector3::zeros(),
+        Vector3::zeros(),
+    );
+    let first: Belief<G, Left, D> = any_belief(start, 0.1, &mut rng);
+    let mut window = Window::<G, Left, D>::new(&first, &WindowOptions::new(capacity));
+    let input = ImuInput {
+        omega_b: Vector3::new(0.0, 0.0, 0.1),
+        force_b: Vector3::new(0.0, 1.0, -GRAVITY_W.z),
+    };
+    let zoh = Discretisation::ZeroOrderHold;
+    let mut motion = Preintegration::new(&start);
+    for _ in 0..100 {
+        motion.push(&input, &GRAVITY_W, 0.01, zoh, &noise);
+    }
+    let mut truth = start;
+    let mut block = |updates: usize| {
+        let fixes: Vec<PositionObservation> = (0..updates)
+            .map(|_| {
+                truth = motion.transition(&truth).0;
+                PositionObservation {
+                    position_w: truth.pose().position + normal::<3, 1>(&mut rng),
+                    covariance_w,
+                    lever_arm_b: Vector3::new(0.1, 0.0, 1.0),
+                }
+            })
+            .collect();
+        let begin = Instant::now();
+        for fix in &fixes {
+            black_box(window.push(black_box(&motion)));
+            black_box(window.update(*fix).expect("an update"));
+        }
+        begin.elapsed().as_secs_f64() / updates as f64
+    };
+    block(capacity);
+    // Short blocks: some of them are not interrupted.
+    let updates = 1_000 / capacity + 2;
+    (0..300)
+        .map(|_| block(updates))
+        .fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+#[ignore = "prints times; run it in release, alone"]
+fn timing() {
+    let isotropic = Matrix3::identity();
+    let anisotropic = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 2.25));
+    println!(
+        "states  constant gains  linearised anew  with biases   (us for a new state and its fix)"
+    );
+    for capacity in [1, 10, 50, 200] {
+        let [constant, anew] =
+            [isotropic, anisotropic].map(|noise| 1e6 * cost_s::<SE23, 9>(capacity, noise));
+        let biased = 1e6 * cost_s::<NavState, 15>(capacity, isotropic);
+        println!("{capacity:6}  {constant:14.2}  {anew:15.2}  {biased:11.2}");
+    }
+}

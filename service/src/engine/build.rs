@@ -1,0 +1,45 @@
+//! From a configuration to an engine of the model and filter that it asks for.
+
+use inekf::filter::{Left, Right, UpdateError};
+use inekf::lie::SE23;
+use inekf::model::NavState;
+
+use super::driver::Engine;
+use super::inertial::InertialEngine;
+use super::model::Model;
+use super::odometry;
+use super::settings::Settings;
+use crate::config::{Config, Invariance, Motion};
+
+/// What is done with an engine, whatever its type.
+pub trait Use {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn with<M: Model>(self, engine: Engine<M>) -> Self::Output;
+}
+
+/// Hands an engine of the configured model and filter to `user`.
+///
+/// # Errors
+/// The declared mismatches cannot be constrained with the configured sources; the error says why.
+pub fn build<U: Use>(config: &Config, user: U) -> Result<U::Output, UpdateError> {
+    let settings = Settings::new(config);
+    let inertial = match &config.motion {
+        Motion::Inertial(inertial) => inertial,
+        Motion::Odometry(odometry) => {
+            let Settings {
+                initial, fusion, ..
+            } = settings;
+            return odometry::build::build(config, odometry, initial, fusion, user);
+        }
+    };
+    let right = config.invariance == Some(Invariance::Right);
+    Ok(match (right, inertial.biases) {
+        (false, true) => user.with(InertialEngine::<NavState, Left, 15>::new(settings)),
+        (false, false) => user.with(InertialEngine::<SE23, Left, 9>::new(settings)),
+        (true, true) => user.with(InertialEngine::<NavState, Right, 15>::new(settings)),
+        (true, false) => user.with(InertialEngine::<SE23, Right, 9>::new(settings)),
+    })
+}

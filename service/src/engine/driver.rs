@@ -1,0 +1,384 @@
+//! The engine: time, order, losses, the first state and restarts, whatever the model.
+
+use inekf_shared::message::{
+    Header, HeadingFix, INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY, PositionFix,
+    REASON_BUFFER_FULL, REASON_INTERNAL, REASON_NOT_READY, REASON_OUT_OF_RANGE, STATE_ALIGNING,
+    STATE_WAITING, StateVector, VelocityFix, WAITING_FOR_IMU, WAITING_FOR_LEVEL,
+    WAITING_FOR_NOTHING, WAITING_FOR_POSITION, WAITING_FOR_REQUEST,
+};
+use inekf_shared::transport::InputMessage;
+use nalgebra::{Matrix3, Vector3};
+
+use super::fix::{Antenna, Fix, Measurement};
+use super::model::{Model, Preceding};
+use super::output::{Outbox, Output};
+use super::settings::{FusionSettings, PositionSource};
+use super::stack::{Missing, Offered, Stack};
+use super::tally::{Refusal, Tally};
+use super::time_base::{Continuity, TimeBase};
+use super::timeline::{Breakdown, Insertion, Timeline};
+
+/// A fix may be this far ahead of the last sample; beyond, its clock is not the samples' clock.
+pub const MAX_AHEAD_NS: u64 = 60_000_000_000;
+
+/// Fixes that may come between a requested state and the first sample that it waits for.
+const MAX_EARLY: usize = 64;
+
+/// A model behind the wire messages.
+#[derive(Debug)]
+pub struct Engine<M: Model> {
+    model: M,
+    fusion: FusionSettings,
+    timeline: Timeline<M>,
+    stack: Stack<M::Measurement>,
+    time_base: TimeBase,
+    /// The last position fix that came before there was a state, with its time.
+    first_position: Option<(u64, Antenna)>,
+    /// A state that was requested before the first sample, to hold from that sample on.
+    requested: Option<M::State>,
+    /// Fixes that came after that request.
+    early: Vec<Fix<M::Measurement>>,
+    /// The last accepted sample with its stamp.
+    last_input: Option<(u64, M::Input)>,
+    output: Output<M::Estimate>,
+}
+
+impl<M: Model> Engine<M> {
+    /// An engine that waits for its first samples, with all the memory it will ever use.
+    pub fn of(model: M, fusion: FusionSettings) -> Self {
+        Self {
+            timeline: Timeline::new(fusion),
+            stack: Stack::new(fusion.stack),
+            time_base: TimeBase::new(model.restart_gap_ns()),
+            first_position: None,
+            requested: None,
+            early: Vec::with_capacity(MAX_EARLY),
+            last_input: None,
+            output: Output::new(fusion.degraded_after_ns),
+            fusion,
+            model,
+        }
+    }
+
+    /// The counters.
+    pub fn tally(&self) -> &Tally {
+        &self.output.tally
+    }
+
+    /// `STATE_*` and `WAITING_FOR_*` now.
+    pub fn state(&self) -> (u32, u32) {
+        if let Some((stamp_ns, _)) = self.timeline.newest() {
+            return (self.output.running_state(stamp_ns), WAITING_FOR_NOTHING);
+        }
+        let initial = self.model.initial();
+        if self.requested.is_some() {
+            (STATE_WAITING, WAITING_FOR_IMU)
+        } else if initial.wait_for_request {
+            (STATE_WAITING, WAITING_FOR_REQUEST)
+        } else if self.time_base.last_ns().is_none() {
+            (STATE_WAITING, WAITING_FOR_IMU)
+        } else if initial.needs_fix() && self.first_position.is_none() {
+            (STATE_WAITING, WAITING_FOR_POSITION)
+        } else {
+            (STATE_ALIGNING, WAITING_FOR_LEVEL)
+        }
+    }
+
+    /// The time of now: stamp of the last accepted sample, or of a state set after it.
+    pub fn last_sample_ns(&self) -> Option<u64> {
+        self.time_base.last_ns()
+    }
+
+    /// The current state and covariance, if there is one.
+    pub fn snapshot(&self) -> Option<StateVector> {
+        self.timeline
+            .newest()
+            .map(|(stamp_ns, state)| self.model.snapshot(stamp_ns, state))
+    }
+
+    /// Takes a sample that was received at `received_ns` (CLOCK_MONOTONIC, for the latency
+    /// stamps only), and publishes what follows from it.
+    pub fn sample(
+        &mut self,
+        sample: &M::Sample,
+        received_ns: u64,
+        outbox: &mut impl Outbox<M::Estimate>,
+    ) {
+        let header = sample.header();
+        let before = Preceding {
+            missing: self.output.tally.receive(M::INPUT, header),
+            stamp_ns: self.last_input.map(|(stamp_ns, _)| stamp_ns),
+        };
+        let stamp_ns = header.stamp_ns;
+        let checked = self.model.sample(sample, &before).and_then(|input| {
+            // The sample of the very stamp the state was set at moves nothing, but it is the
+            // input that holds from there on.
+            if self.timeline.awaits_input_at(stamp_ns) {
+                self.time_base.accept(header);
+                return Ok((input, Continuity::Next));
+            }
+            Ok((input, self.time_base.judge(header)?))
+        });
+        let (input, continuity) = match checked {
+            Ok(checked) => checked,
+            Err(refusal) => return self.output.tally.refuse(refusal),
+        };
+        if continuity == Continuity::Restart {
+            self.forget();
+        }
+        self.last_input = Some((stamp_ns, input));
+        self.output.answer(header.seq, header.sent_ns, received_ns);
+        if self.timeline.newest().is_none() {
+            if !self.try_start(stamp_ns, &input) {
+                return;
+            }
+            while let Some(fix) = self.early.pop() {
+                self.take(fix, outbox);
+            }
+        }
+        self.unstack(stamp_ns, outbox);
+        if self
+            .timeline
+            .newest()
+            .is_some_and(|(now, _)| now == stamp_ns)
+        {
+            self.timeline.set_input(input);
+            return;
+        }
+        let Self {
+            model,
+            timeline,
+            output,
+            ..
+        } = self;
+        let advanced = timeline.advance(model, stamp_ns, input, |event| {
+            output.record(model, &event, outbox);
+        });
+        if let Err(Breakdown) = advanced {
+            self.output.tally.refuse(Refusal(REASON_INTERNAL));
+            self.forget();
+        }
+    }
+
+    /// Takes a position fix.
+    pub fn position(&mut self, message: &PositionFix, outbox: &mut impl Outbox<M::Estimate>) {
+        self.output.tally.receive(INPUT_POSITION, &message.header);
+        self.offer(self.model.position(message), outbox);
+    }
+
+    /// Takes a velocity fix.
+    pub fn velocity(&mut self, message: &VelocityFix, outbox: &mut impl Outbox<M::Estimate>) {
+        self.output.tally.receive(INPUT_VELOCITY, &message.header);
+        self.offer(self.model.velocity(message), outbox);
+    }
+
+    /// Takes a heading fix.
+    pub fn heading(&mut self, message: &HeadingFix, outbox: &mut impl Outbox<M::Estimate>) {
+        self.output.tally.receive(INPUT_HEADING, &message.header);
+        self.offer(self.model.heading(message), outbox);
+    }
+
+    /// Counts a message of another model's topic as refused.
+    pub fn refuse(&mut self, input: usize, header: &Header, refusal: Refusal) {
+        self.output.tally.receive(input, header);
+        self.output.tally.refuse(refusal);
+    }
+
+    /// Forgets the state and initialises anew.
+    pub fn reset(&mut self) {
+        self.time_base = TimeBase::new(self.model.restart_gap_ns());
+        self.requested = None;
+        self.last_input = None;
+        self.forget();
+    }
+
+    /// Continues from `state`; a stamp of 0 means the stamp of the last sample, or where the first one
+    /// begins if none has come yet.
+    ///
+    /// # Errors
+    /// A sentence that names the fault and the remedy; the estimate is then unchanged.
+    pub fn set_state(&mut self, state: &StateVector) -> Result<(), &'static str> {
+        let given_ns = (state.stamp_ns != 0).then_some(state.stamp_ns);
+        let last_ns = self.last_sample_ns();
+        if let (Some(given_ns), Some(last_ns)) = (given_ns, last_ns) {
+            if given_ns < last_ns {
+                return Err(
+                    "the state is older than the last sample: send it with a stamp of 0 (now) or \
+                     reset first",
+                );
+            }
+            if given_ns - last_ns > self.model.restart_gap_ns() {
+                return Err("the state lies too far ahead of the last sample: check its clock");
+            }
+        }
+        let requested = self.model.requested(state)?;
+        let Some(stamp_ns) = given_ns.or(last_ns) else {
+            self.requested = Some(requested);
+            return Ok(());
+        };
+        let input = self
+            .last_input
+            .and_then(|(input_ns, input)| (input_ns == stamp_ns).then_some(input));
+        self.start(stamp_ns, input, requested);
+        Ok(())
+    }
+
+    /// Takes a checked fix, or counts its refusal.
+    fn offer(
+        &mut self,
+        fix: Result<Fix<M::Measurement>, Refusal>,
+        outbox: &mut impl Outbox<M::Estimate>,
+    ) {
+        let fix = match fix {
+            Ok(fix) => fix,
+            Err(refusal) => return self.output.tally.refuse(refusal),
+        };
+        if self.timeline.newest().is_none() {
+            return self.keep_first(fix);
+        }
+        self.take(fix, outbox);
+    }
+
+    /// Puts a fix on the timeline, once it has its partner.
+    fn take(&mut self, fix: Fix<M::Measurement>, outbox: &mut impl Outbox<M::Estimate>) {
+        let ahead_ns = |now_ns| fix.stamp_ns.saturating_sub(now_ns);
+        if self
+            .last_sample_ns()
+            .is_some_and(|now_ns| ahead_ns(now_ns) > MAX_AHEAD_NS)
+        {
+            return self.output.tally.refuse(Refusal(REASON_OUT_OF_RANGE));
+        }
+        match self.stack.offer(fix) {
+            Offered::Ready(fix) => self.insert(fix, outbox),
+            Offered::Waits => {}
+            Offered::Displaced(oldest) => self.alone(oldest, outbox),
+        }
+    }
+
+    /// Lets go of the fixes whose partners have not come by `now_ns`.
+    fn unstack(&mut self, now_ns: u64, outbox: &mut impl Outbox<M::Estimate>) {
+        while let Some(fix) = self.stack.overdue(now_ns) {
+            self.alone(fix, outbox);
+        }
+    }
+
+    /// A fix whose partner has not come.
+    fn alone(&mut self, fix: Fix<M::Measurement>, outbox: &mut impl Outbox<M::Estimate>) {
+        self.output.tally.counters.unpaired += 1;
+        match self.stack.missing() {
+            Missing::Unconstrained => self.insert(fix, outbox),
+            Missing::Skip => {}
+        }
+    }
+
+    fn insert(&mut self, fix: Fix<M::Measurement>, outbox: &mut impl Outbox<M::Estimate>) {
+        let Self {
+            model,
+            timeline,
+            output,
+            ..
+        } = self;
+        let insertion = timeline.insert(model, fix, |event| output.record(model, &event, outbox));
+        match insertion {
+            Insertion::Waiting | Insertion::Judged => {}
+            Insertion::TooLate => self.output.tally.counters.late += fix.count(),
+            Insertion::Full => self.output.tally.refuse(Refusal(REASON_BUFFER_FULL)),
+        }
+    }
+
+    /// Before there is a state, a position fix is kept to start from, and all are kept for a requested state;
+    /// otherwise they have nothing to correct. A fix that is replaced or unusable is counted as not ready.
+    fn keep_first(&mut self, fix: Fix<M::Measurement>) {
+        if self.requested.is_some() && self.early.len() < MAX_EARLY {
+            return self.early.push(fix);
+        }
+        let initial = self.model.initial();
+        let usable = initial.needs_fix() && !initial.wait_for_request;
+        match fix.measurement.antenna() {
+            Some(antenna) if usable => {
+                if self
+                    .first_position
+                    .replace((fix.stamp_ns, antenna))
+                    .is_some()
+                {
+                    self.output.tally.refuse(Refusal(REASON_NOT_READY));
+                }
+            }
+            _ => self.output.tally.refuse(Refusal(REASON_NOT_READY)),
+        }
+    }
+
+    /// Starts if everything that the first state needs has come. True if there is one.
+    fn try_start(&mut self, stamp_ns: u64, input: &M::Input) -> bool {
+        let without_ns = self.model.start_ns(None, stamp_ns, input);
+        let of_stamp = |start_ns| (start_ns == stamp_ns).then_some(*input);
+        if let Some(state) = self.requested.take() {
+            self.start(without_ns, of_stamp(without_ns), state);
+            return true;
+        }
+        if self.model.initial().wait_for_request {
+            return false;
+        }
+        let Some(r_wb) = self.model.attitude(stamp_ns, input) else {
+            return false;
+        };
+        let (start_ns, antenna) = match self.model.initial().position {
+            PositionSource::Given { position_w, sigma } => (
+                without_ns,
+                Antenna {
+                    position_w,
+                    covariance_w: Matrix3::identity() * (sigma * sigma),
+                    lever_arm_b: Vector3::zeros(),
+                },
+            ),
+            PositionSource::FirstFix => match self.first_position {
+                // A fix ahead of the samples waits for them; an old one is no place to start from.
+                Some((fix_ns, antenna)) if fix_ns <= stamp_ns => {
+                    self.first_position = None;
+                    if stamp_ns - fix_ns > self.oldest_start_ns() {
+                        self.output.tally.refuse(Refusal(REASON_NOT_READY));
+                        return false;
+                    }
+                    self.output.tally.counters.accepted += 1;
+                    (self.model.start_ns(Some(fix_ns), stamp_ns, input), antenna)
+                }
+                _ => return false,
+            },
+        };
+        let alignment = self.model.initial().alignment(r_wb, &antenna);
+        let state = self.model.aligned(&alignment);
+        self.start(start_ns, of_stamp(start_ns), state);
+        true
+    }
+
+    /// How old the fix may be that the state starts from: as late as any fix may be, or as long as
+    /// the samples need not be doubted.
+    fn oldest_start_ns(&self) -> u64 {
+        self.model.max_gap_ns().max(self.fusion.late_window_ns)
+    }
+
+    fn start(&mut self, stamp_ns: u64, input: Option<M::Input>, state: M::State) {
+        let early = core::mem::take(&mut self.early);
+        self.forget();
+        self.early = early;
+        self.requested = None;
+        self.output.started(stamp_ns, &self.model.place_w(&state));
+        self.timeline.start(stamp_ns, input, state);
+        self.time_base.advance_to(stamp_ns);
+    }
+
+    /// Forgets the state. The fixes that still waited for a sample are counted, as every input is.
+    fn forget(&mut self) {
+        let waiting = self.timeline.waiting()
+            + self.stack.clear()
+            + self.early.len()
+            + usize::from(self.first_position.is_some());
+        for _ in 0..waiting {
+            self.output.tally.refuse(Refusal(REASON_NOT_READY));
+        }
+        self.timeline.clear();
+        self.early.clear();
+        self.model.forget_attitude();
+        self.first_position = None;
+    }
+}

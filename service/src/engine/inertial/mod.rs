@@ -1,0 +1,252 @@
+//! The model `imu`: an IMU moves SE_2(3), with biases or without; position, velocity and heading correct it.
+
+use inekf::filter::{Alignment, Belief, InertialSide, Levelled, UpdateError, propagate_in_place};
+use inekf::lie::SO3;
+use inekf::model::{ImuInput, ImuNoise, InertialState};
+use inekf_shared::message::{
+    EstimateSe23, HeadingFix, INPUT_IMU, ImuSample, MODEL_IMU, PositionFix, StateVector,
+    VelocityFix, Zero,
+};
+use nalgebra::Vector3;
+
+use super::driver::Engine;
+use super::fix::Fix;
+use super::levelling::Levelling;
+use super::model::{Fused, Model, Preceding};
+use super::output::write_triangle;
+use super::recovery::Widening;
+use super::settings::{
+    FusionSettings, ImuSettings, InitialSettings, LevelSource, Settings, seconds,
+};
+use super::tally::Refusal;
+use crate::config::Hold;
+
+pub mod aiding;
+mod intake;
+mod request;
+
+use aiding::Aiding;
+
+/// An inertial filter of side S on the state G (9 or 15 dimensions).
+#[derive(Debug)]
+pub struct Inertial<G, S, const D: usize> {
+    imu: ImuSettings,
+    initial: InitialSettings,
+    fusion: FusionSettings,
+    levelling: Levelling,
+    filter: core::marker::PhantomData<(G, S)>,
+}
+
+/// An engine of the model `imu`.
+pub type InertialEngine<G, S, const D: usize> = Engine<Inertial<G, S, D>>;
+
+impl<G: InertialState<D>, S: InertialSide, const D: usize> InertialEngine<G, S, D> {
+    /// An engine that waits for its first samples, with all the memory it will ever use.
+    pub fn new(settings: Settings) -> Self {
+        Self::of(Inertial::new(&settings), settings.fusion)
+    }
+}
+
+/// What moves the state between two samples.
+#[derive(Clone, Copy, Debug)]
+pub struct ImuMotion {
+    held: ImuInput,
+    noise: ImuNoise,
+}
+
+impl<G: InertialState<D>, S: InertialSide, const D: usize> Inertial<G, S, D> {
+    fn new(settings: &Settings) -> Self {
+        let window_ns = match settings.initial.level {
+            LevelSource::Accelerometer { window_ns } => window_ns,
+            LevelSource::Given { .. } => 0,
+        };
+        Self {
+            imu: settings.imu,
+            initial: settings.initial,
+            fusion: settings.fusion,
+            levelling: Levelling::new(window_ns),
+            filter: core::marker::PhantomData,
+        }
+    }
+
+    /// The input that speaks for an interval. Over a gap neither end does: their mean is the best
+    /// guess, and [`ImuSettings::noise`] doubts it.
+    fn held(&self, before: Option<&ImuInput>, after: &ImuInput, interval_ns: u64) -> ImuInput {
+        let Some(before) = before else { return *after };
+        if interval_ns > self.imu.max_gap_ns {
+            return before.midpoint(after);
+        }
+        match self.imu.hold {
+            Hold::Backward => *after,
+            Hold::Forward => *before,
+            Hold::Midpoint => before.midpoint(after),
+        }
+    }
+}
+
+impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G, S, D> {
+    type Sample = ImuSample;
+    type Estimate = EstimateSe23;
+    type Input = ImuInput;
+    type Motion = ImuMotion;
+    type Measurement = Aiding;
+    type State = Belief<G, S, D>;
+    const INPUT: usize = INPUT_IMU;
+
+    fn initial(&self) -> &InitialSettings {
+        &self.initial
+    }
+
+    fn restart_gap_ns(&self) -> u64 {
+        self.imu.restart_gap_ns
+    }
+
+    fn max_gap_ns(&self) -> u64 {
+        self.imu.max_gap_ns
+    }
+
+    fn sample(&self, message: &ImuSample, _before: &Preceding) -> Result<ImuInput, Refusal> {
+        intake::imu(message, &self.imu)
+    }
+
+    fn position(&self, message: &PositionFix) -> Result<Fix<Aiding>, Refusal> {
+        intake::position(message, &self.fusion.sources)
+    }
+
+    fn velocity(&self, message: &VelocityFix) -> Result<Fix<Aiding>, Refusal> {
+        intake::velocity(message, &self.fusion.sources)
+    }
+
+    fn heading(&self, message: &HeadingFix) -> Result<Fix<Aiding>, Refusal> {
+        intake::heading(message, &self.fusion.sources)
+    }
+
+    fn attitude(&mut self, stamp_ns: u64, input: &ImuInput) -> Option<SO3> {
+        match self.initial.level {
+            LevelSource::Given { roll, pitch } => Some(SO3::from_roll_pitch_heading(
+                roll,
+                pitch,
+                self.initial.heading,
+            )),
+            LevelSource::Accelerometer { .. } => {
+                self.levelling.push(stamp_ns, input);
+                if !self.levelling.is_full() {
+                    return None;
+                }
+                let force_b = self.levelling.mean_force()?;
+                Some(Levelled::from_force(&force_b, self.initial.heading)?.r_wb)
+            }
+        }
+    }
+
+    fn forget_attitude(&mut self) {
+        self.levelling.clear();
+    }
+
+    fn start_ns(&self, given_ns: Option<u64>, stamp_ns: u64, _input: &ImuInput) -> u64 {
+        given_ns.unwrap_or(stamp_ns)
+    }
+
+    fn aligned(&self, alignment: &Alignment) -> Belief<G, S, D> {
+        alignment.belief()
+    }
+
+    fn requested(&self, state: &StateVector) -> Result<Belief<G, S, D>, &'static str> {
+        request::belief_of(state, &self.initial)
+    }
+
+    fn motion(&self, before: Option<&ImuInput>, after: &ImuInput, interval_ns: u64) -> ImuMotion {
+        ImuMotion {
+            held: self.held(before, after, interval_ns),
+            noise: self.imu.noise(interval_ns),
+        }
+    }
+
+    fn advance(&self, belief: &mut Belief<G, S, D>, motion: &ImuMotion, part_ns: u64) {
+        propagate_in_place(
+            belief,
+            &motion.held,
+            &self.imu.g_w,
+            seconds(part_ns),
+            self.imu.discretisation,
+            &motion.noise,
+        );
+    }
+
+    fn is_sound(&self, belief: &Belief<G, S, D>) -> bool {
+        let mean = &belief.mean;
+        let pose = mean.pose();
+        mean.is_finite()
+            && pose.position.amax() <= MAX_POSITION_M
+            && pose.velocity.amax() <= MAX_VELOCITY_MPS
+            && mean.gyro_bias().amax() <= self.imu.max_gyro
+            && mean.accel_bias().amax() <= self.imu.max_accel
+            && (0..D).all(|i| {
+                let variance = belief.covariance.matrix()[(i, i)];
+                variance.is_finite() && variance >= 0.0
+            })
+    }
+
+    fn fuse(
+        &self,
+        belief: &mut Belief<G, S, D>,
+        fix: &Fix<Aiding>,
+        gated: bool,
+    ) -> Result<Fused, UpdateError> {
+        let options = self.fusion.options(gated);
+        fix.measurement.fuse(belief, &options)
+    }
+
+    fn widening(&self, belief: &Belief<G, S, D>, fix: &Fix<Aiding>, nis: f64) -> Widening {
+        fix.measurement.widening(&belief.mean, nis)
+    }
+
+    fn fuse_widened(
+        &self,
+        belief: &mut Belief<G, S, D>,
+        fix: &Fix<Aiding>,
+        widening: &Widening,
+    ) -> Result<Fused, UpdateError> {
+        let mut wide = fix.measurement.widened(belief, widening);
+        let fused = self.fuse(&mut wide, fix, false)?;
+        *belief = wide;
+        Ok(fused)
+    }
+
+    fn place_w(&self, belief: &Belief<G, S, D>) -> Vector3<f64> {
+        belief.mean.pose().position
+    }
+
+    fn write(&self, belief: &Belief<G, S, D>, message: &mut EstimateSe23) {
+        let pose = belief.mean.pose();
+        message.head.dimension = D as u32;
+        message.q_wb = pose.rotation.quaternion_xyzw();
+        message.v_w_mps = pose.velocity.into();
+        message.p_w_m = pose.position.into();
+        message.gyro_bias_rps = belief.mean.gyro_bias().into();
+        message.accel_bias_mps2 = belief.mean.accel_bias().into();
+        write_triangle(&mut message.covariance, &belief.left_covariance());
+    }
+
+    fn snapshot(&self, stamp_ns: u64, belief: &Belief<G, S, D>) -> StateVector {
+        let pose = belief.mean.pose();
+        let mut state = StateVector {
+            model: MODEL_IMU,
+            dimension: D as u32,
+            stamp_ns,
+            q_wb: pose.rotation.quaternion_xyzw(),
+            v_w_mps: pose.velocity.into(),
+            p_w_m: pose.position.into(),
+            gyro_bias_rps: belief.mean.gyro_bias().into(),
+            accel_bias_mps2: belief.mean.accel_bias().into(),
+            ..StateVector::ZERO
+        };
+        write_triangle(&mut state.covariance, &belief.left_covariance());
+        state
+    }
+}
+
+/// Beyond this, m, an estimate is not of this world: the filter has diverged.
+const MAX_POSITION_M: f64 = 1e10;
+/// Likewise, m/s.
+const MAX_VELOCITY_MPS: f64 = 1e6;

@@ -12,19 +12,15 @@ use crate::lie::{LieGroup, SE23};
 /// A Lie group whose first nine tangent coordinates are those of SE_2(3).
 pub trait InertialState<const D: usize>: LieGroup<D> {
     /// Attitude, velocity and position.
-    #[inline]
     fn pose(&self) -> &SE23;
 
     /// Gyroscope bias, rad/s, body frame; zero where the state has none.
-    #[inline]
     fn gyro_bias(&self) -> Vector3<f64>;
 
     /// Accelerometer bias, m/s^2, body frame; zero where the state has none.
-    #[inline]
     fn accel_bias(&self) -> Vector3<f64>;
 
     /// The state with these parts; biases are dropped where the state has none.
-    #[inline]
     fn from_parts(pose: SE23, gyro_bias: Vector3<f64>, accel_bias: Vector3<f64>) -> Self;
 
     /// The state after one increment; biases stay.

@@ -105,17 +105,20 @@ impl Transition {
             // (c x phi)_i = c_j phi_k - c_k phi_j
             let (phi_j, phi_k, nu) = (&p[j], &p[k], &p[3 + i]);
             if D == POSE {
-                t[i] = combined::<D, D, R, _>(&p[i], [], []);
-                t[3 + i] = combined::<D, D, R, _>(nu, [c_1[j], -c_1[k]], [phi_k, phi_j]);
+                t[i] = combined::<D, D, D, R, 0>(&p[i], [], []);
+                t[3 + i] = combined::<D, _, _, _, _>(nu, [c_1[j], -c_1[k]], [phi_k, phi_j]);
                 let factors = [self.dt_s, c_2[j], -c_2[k]];
-                t[6 + i] = combined::<D, D, R, _>(&p[6 + i], factors, [nu, phi_k, phi_j]);
+                t[6 + i] = combined::<D, _, _, _, _>(&p[6 + i], factors, [nu, phi_k, phi_j]);
             } else {
                 let b = |n: usize| &p[POSE + n];
                 let f = |n: usize, row: usize| -inputs[n][row];
-                t[i] =
-                    combined::<D, D, R, _>(&p[i], [f(0, i), f(1, i), f(2, i)], [b(0), b(1), b(2)]);
+                t[i] = combined::<D, _, _, _, _>(
+                    &p[i],
+                    [f(0, i), f(1, i), f(2, i)],
+                    [b(0), b(1), b(2)],
+                );
                 let r = 3 + i;
-                t[r] = combined::<D, D, R, _>(
+                t[r] = combined::<D, _, _, _, _>(
                     nu,
                     [
                         c_1[j],
@@ -130,7 +133,7 @@ impl Transition {
                     [phi_k, phi_j, b(0), b(1), b(2), b(3), b(4), b(5)],
                 );
                 let r = 6 + i;
-                t[r] = combined::<D, D, R, _>(
+                t[r] = combined::<D, _, _, _, _>(
                     &p[r],
                     [
                         self.dt_s,
@@ -212,14 +215,16 @@ impl Transition {
                 rows[6 + i] += c_2[j] * t[k] - c_2[k] * t[j] + self.dt_s * t[3 + i];
             }
         }
+        let less = |n: usize| -t[D + n];
         // The forces do not act on the rotation.
-        let acting = if ROWS > 3 { INPUTS } else { 3 };
-        for n in 0..acting {
-            let bias = t[D + n];
-            for row in 0..ROWS {
-                rows[row] -= inputs[n][row] * bias;
-            }
-        }
+        let mut rows: Column<ROWS> = if ROWS > 3 {
+            let factors = [less(0), less(1), less(2), less(3), less(4), less(5)];
+            let [a, b, c, d, e, f] = inputs;
+            combined::<ROWS, _, _, _, _>(&rows, factors, [a, b, c, d, e, f])
+        } else {
+            let factors = [less(0), less(1), less(2)];
+            combined::<ROWS, _, _, _, _>(&rows, factors, [&inputs[0], &inputs[1], &inputs[2]])
+        };
         if let Some(e) = &self.turn {
             for block in rows.chunks_exact_mut(3) {
                 let [x, y, z] = block else { continue };

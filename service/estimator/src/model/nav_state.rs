@@ -144,7 +144,7 @@ impl InertialState<15> for NavState {
     }
 
     fn carry(transition: &Transition, p: &mut Matrix15, noise: &ImuNoise) {
-        transition.carry::<15, 22>(p, noise);
+        transition.carry(p, noise);
     }
 
     fn advance(&self, step: &ImuStep, noise: &ImuNoise) -> (Self, Matrix15, Matrix15) {

@@ -3,7 +3,7 @@
 //! Order: before each sample the fixes with a stamp up to its own: positions, then velocities, then headings; what is
 //! left at the end and lies ahead of the last sample is not fed.
 
-use inekf::filter::{Left, Side};
+use inekf::filter::{InertialSide, Left};
 use inekf::lie::SE23;
 use inekf::model::{InertialState, NavState};
 use inekf_client::dataset::{Dataset, Initial, Meta};
@@ -89,7 +89,7 @@ pub fn initial_state(meta: &Meta) -> Option<StateVector> {
 }
 
 /// Feeds everything that is due.
-fn feed<G: InertialState<D>, S: Side, const D: usize>(
+fn feed<G: InertialState<D>, S: InertialSide, const D: usize>(
     dataset: &Dataset,
     config: &Config,
     outbox: &mut impl Outbox<EstimateSe23>,

@@ -15,7 +15,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use inekf::filter::{
-    Belief, Covariance, GainRule, Gate, Kalman, Left, Linearised, Right, Side, Transport,
+    Belief, Covariance, GainRule, Gate, InertialSide, Kalman, Left, Linearised, Right, Transport,
     UpdateError, UpdateOptions, propagate, propagate_odometry, update_with,
 };
 use inekf::lie::{LieGroup, SE2, SE23, SO3};
@@ -100,12 +100,12 @@ trait Drive<G: LieGroup<D>, const D: usize> {
     /// How many updates there are.
     fn updates(&self) -> usize;
 
-    fn start<S: Side>(&self) -> Belief<G, S, D>;
+    fn start<S: InertialSide>(&self) -> Belief<G, S, D>;
 
     /// Everything that precedes update `k`.
-    fn predict<S: Side>(&self, k: usize, belief: &mut Belief<G, S, D>);
+    fn predict<S: InertialSide>(&self, k: usize, belief: &mut Belief<G, S, D>);
 
-    fn correct<S: Side>(
+    fn correct<S: InertialSide>(
         &self,
         k: usize,
         belief: &mut Belief<G, S, D>,
@@ -191,15 +191,15 @@ impl Drive<SE2, 3> for Run {
         self.steps.len()
     }
 
-    fn start<S: Side>(&self) -> Belief<SE2, S, 3> {
+    fn start<S: InertialSide>(&self) -> Belief<SE2, S, 3> {
         start(self)
     }
 
-    fn predict<S: Side>(&self, k: usize, belief: &mut Belief<SE2, S, 3>) {
+    fn predict<S: InertialSide>(&self, k: usize, belief: &mut Belief<SE2, S, 3>) {
         *belief = propagate_odometry(belief, &self.steps[k], &self.odometry_noise());
     }
 
-    fn correct<S: Side>(
+    fn correct<S: InertialSide>(
         &self,
         k: usize,
         belief: &mut Belief<SE2, S, 3>,
@@ -287,19 +287,19 @@ impl Drive<SE23, 9> for ImuDrive {
         self.fixes.len()
     }
 
-    fn start<S: Side>(&self) -> Belief<SE23, S, 9> {
+    fn start<S: InertialSide>(&self) -> Belief<SE23, S, 9> {
         let variances = start_sigmas().map(|sigma| sigma * sigma);
         Belief::from_left_covariance(self.start, Covariance::from_variances(&variances))
     }
 
-    fn predict<S: Side>(&self, k: usize, belief: &mut Belief<SE23, S, 9>) {
+    fn predict<S: InertialSide>(&self, k: usize, belief: &mut Belief<SE23, S, 9>) {
         for sample in &self.samples[k * SAMPLES..(k + 1) * SAMPLES] {
             let zoh = Discretisation::ZeroOrderHold;
             *belief = propagate(belief, sample, &GRAVITY_W, IMU_DT_S, zoh, &NOISE);
         }
     }
 
-    fn correct<S: Side>(
+    fn correct<S: InertialSide>(
         &self,
         k: usize,
         belief: &mut Belief<SE23, S, 9>,

@@ -10,8 +10,14 @@ pub(crate) type Column<const D: usize> = [f64; D];
 /// The first ROWS rows (at most all) of `base + sum_n factors_n columns_n`, summed in this order; zero in the other rows of the
 /// result.
 #[inline(always)]
-pub(crate) fn combined<const ROWS: usize, const D: usize, const R: usize, const N: usize>(
-    base: &Column<D>,
+pub(crate) fn combined<
+    const ROWS: usize,
+    const B: usize,
+    const D: usize,
+    const R: usize,
+    const N: usize,
+>(
+    base: &Column<B>,
     factors: [f64; N],
     columns: [&Column<D>; N],
 ) -> Column<R> {

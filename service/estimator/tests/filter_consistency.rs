@@ -5,7 +5,7 @@
 mod common;
 
 use common::{GRAVITY_W, normal, seeded};
-use inekf::filter::{Belief, Covariance, Left, Side, UpdateOptions, propagate, update};
+use inekf::filter::{Belief, Covariance, InertialSide, Left, UpdateOptions, propagate, update};
 use inekf::lie::{LieGroup, SE23, SO3, hat};
 use inekf::model::{Discretisation, ImuInput, ImuNoise, NavState, PositionObservation};
 use nalgebra::{Cholesky, Matrix3, SVector, Vector3};
@@ -98,7 +98,7 @@ fn sample(rng: &mut ChaCha8Rng, psd: f64) -> Vector3<f64> {
 }
 
 /// NEES after the fix of every second, and NIS of that fix.
-fn run<S: Side>(truth: &[SE23], options: &UpdateOptions, seed: u64) -> Vec<(f64, f64)> {
+fn run<S: InertialSide>(truth: &[SE23], options: &UpdateOptions, seed: u64) -> Vec<(f64, f64)> {
     let mut rng = seeded(seed);
     let sigmas = prior_sigmas();
     let xi = sigmas.component_mul(&normal::<15, 1>(&mut rng));

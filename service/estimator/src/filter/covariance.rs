@@ -34,7 +34,7 @@ fn put_back_negative_variances<const D: usize>(matrix: &mut SMatrix<f64, D, D>) 
 /// `column + factor * other`, in place.
 #[inline(always)]
 fn add<const D: usize>(column: &mut Column<D>, factor: f64, other: &Column<D>) {
-    *column = combined::<D, D, D, 1>(column, [factor], [other]);
+    *column = combined::<D, _, _, _, _>(column, [factor], [other]);
 }
 
 /// The first ROWS rows of `column - others row^T`, `row` being a row of `factors`.
@@ -46,7 +46,7 @@ fn without<const ROWS: usize, const D: usize, const M: usize>(
     others: &[Column<D>; M],
 ) -> Column<D> {
     let factors = core::array::from_fn(|k| -factors[k][row]);
-    combined::<ROWS, D, D, M>(column, factors, others.each_ref())
+    combined::<ROWS, _, _, _, _>(column, factors, others.each_ref())
 }
 
 /// `A H^T`. A sensor sees few of the states: the others are passed over.
@@ -172,7 +172,7 @@ impl<const D: usize> Covariance<D> {
         }
         for (row, column) in excess.iter_mut().enumerate() {
             let factors = core::array::from_fn(|k| -noise[(k, row)]);
-            *column = combined::<D, D, D, M>(column, factors, gains.each_ref());
+            *column = combined::<D, _, _, _, _>(column, factors, gains.each_ref());
         }
         for (index, column) in corrected.0.data.0.iter_mut().enumerate() {
             // As many rows as reach the diagonal, in lengths that are known.

@@ -121,44 +121,40 @@ pub(crate) fn congruence<const D: usize, const COUPLED: usize>(
     p: &mut SMatrix<f64, D, D>,
     a: &SMatrix<f64, D, D>,
 ) {
-    const { assert!(COUPLED <= D && COUPLED % 3 == 0) };
+    const { assert!(COUPLED <= D && COUPLED.is_multiple_of(3)) };
     let p = &mut p.data.0;
     let nothing = [0.0; D];
     let mut t = [[0.0; D]; COUPLED];
     for (i, column) in t.iter_mut().enumerate() {
         let start = i - i % 3;
         let below = [a[(i, 0)], a[(i, 1)], a[(i, 2)]];
-        *column = combined::<D, D, D, 3>(&nothing, below, [&p[0], &p[1], &p[2]]);
+        *column = combined::<D, _, _, _, _>(&nothing, below, [&p[0], &p[1], &p[2]]);
         if start > 0 {
             let diagonal = [a[(i, start)], a[(i, start + 1)], a[(i, start + 2)]];
             let of_block = [&p[start], &p[start + 1], &p[start + 2]];
-            *column = combined::<D, D, D, 3>(column, diagonal, of_block);
+            *column = combined::<D, _, _, _, _>(column, diagonal, of_block);
         }
     }
+    // Both triangles at once: of the two entries of a pair, the one written last stands in both.
     for (index, t) in t.iter().enumerate() {
-        let last = index - index % 3;
+        let mut put = |row: usize, entry: f64| {
+            p[index][row] = entry;
+            p[row][index] = entry;
+        };
         for i in 0..3 {
-            let entry = a[(i, 0)] * t[0] + a[(i, 1)] * t[1] + a[(i, 2)] * t[2];
-            p[index][i] = entry;
+            put(i, a[(i, 0)] * t[0] + a[(i, 1)] * t[1] + a[(i, 2)] * t[2]);
         }
-        for start in (3..=last).step_by(3) {
+        for start in (3..=index - index % 3).step_by(3) {
             for i in start..start + 3 {
-                p[index][i] = a[(i, 0)] * t[0]
-                    + a[(i, 1)] * t[1]
-                    + a[(i, 2)] * t[2]
-                    + a[(i, start)] * t[start]
+                let below = a[(i, 0)] * t[0] + a[(i, 1)] * t[1] + a[(i, 2)] * t[2];
+                let diagonal = a[(i, start)] * t[start]
                     + a[(i, start + 1)] * t[start + 1]
                     + a[(i, start + 2)] * t[start + 2];
+                put(i, below + diagonal);
             }
         }
-        p[index][COUPLED..].copy_from_slice(&t[COUPLED..]);
-    }
-    for column in 0..COUPLED {
-        for row in 0..column {
-            p[row][column] = p[column][row];
-        }
-        for row in COUPLED..D {
-            p[row][column] = p[column][row];
+        for (row, entry) in t.iter().enumerate().skip(COUPLED) {
+            put(row, *entry);
         }
     }
 }

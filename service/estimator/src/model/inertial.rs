@@ -105,7 +105,7 @@ impl InertialState<9> for SE23 {
     }
 
     fn carry(transition: &Transition, p: &mut SMatrix<f64, 9, 9>, noise: &ImuNoise) {
-        transition.carry::<9, 16>(p, noise);
+        transition.carry(p, noise);
     }
 
     const IS_GROUP_AFFINE: bool = true;

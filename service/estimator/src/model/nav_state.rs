@@ -145,7 +145,7 @@ impl InertialState<15> for NavState {
     }
 
     fn carry(transition: &Transition, p: &mut Matrix15, noise: &ImuNoise) {
-        transition.carry::<15, 22>(p, noise);
+        transition.carry(p, noise);
     }
 
     const IS_GROUP_AFFINE: bool = false;

@@ -12,9 +12,9 @@
 //!
 //! on every side of the estimate ([`filter::Side`](crate::filter::Side) gives the blocks; E is the identity on
 //! some). F is never formed: `T = P F^T` combines whole columns of P, and of `F T` the part on the biases is T
-//! itself, so that only the upper triangle of the pose is left to do. The noise, as large as a bias of
-//! covariance `psd / dt`, joins T in between. [`propagate_dense`](crate::filter::propagate_dense) is the
-//! reference.
+//! itself, so that only the upper triangle of the pose is left to do; E comes last, block by block. The noise,
+//! as large as a bias of covariance `psd / dt`, joins T in between.
+//! [`propagate_dense`](crate::filter::propagate_dense) is the reference.
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
@@ -41,38 +41,58 @@ const POSE: usize = 9;
 /// How many inputs are noisy, and how many biases there are: three rates and three forces.
 const INPUTS: usize = 6;
 
+/// `E (a, b, c)`.
+#[inline(always)]
+fn times(e: &Matrix3<f64>, a: f64, b: f64, c: f64) -> [f64; 3] {
+    [
+        e[(0, 0)] * a + e[(0, 1)] * b + e[(0, 2)] * c,
+        e[(1, 0)] * a + e[(1, 1)] * b + e[(1, 2)] * c,
+        e[(2, 0)] * a + e[(2, 1)] * b + e[(2, 2)] * c,
+    ]
+}
+
 impl Transition {
-    /// Makes P `F P F^T + Q`, exactly symmetric; D = 9 without biases and 15 with them, and R is at least `D + 6`.
+    /// Makes P `F P F^T + Q`, exactly symmetric; D = 9 without biases and 15 with them.
     #[inline(always)]
-    pub(super) fn carry<const D: usize, const R: usize>(
-        &self,
-        p: &mut SMatrix<f64, D, D>,
-        noise: &ImuNoise,
-    ) {
+    pub(super) fn carry<const D: usize>(&self, p: &mut SMatrix<f64, D, D>, noise: &ImuNoise) {
         const { assert!(D == POSE || D == POSE + INPUTS) };
-        const { assert!(R >= D + INPUTS) };
         let p = &mut p.data.0;
         let inputs = self.input_columns();
-        let mut t: [Column<R>; POSE] = self.times_transposed(p, &inputs);
-        self.append_noise::<D, R>(&mut t, &inputs, noise);
-        self.turn_columns(&mut t);
+        let mut t = self.times_transposed(p, &inputs);
+        let densities = self.densities(noise);
+        let mut pose = [[0.0; POSE]; POSE];
         for i in 0..3 {
-            self.finish::<D, R, 3>(p, &t[i], &inputs, i);
-            self.finish::<D, R, 6>(p, &t[3 + i], &inputs, 3 + i);
-            self.finish::<D, R, 9>(p, &t[6 + i], &inputs, 6 + i);
+            pose[i] = self.rows::<D, 3>(&t[i], &inputs, &densities, i);
+            pose[3 + i] = self.rows::<D, 6>(&t[3 + i], &inputs, &densities, 3 + i);
+            pose[6 + i] = self.rows::<D, 9>(&t[6 + i], &inputs, &densities, 6 + i);
         }
-        for column in 0..POSE {
-            for row in POSE..D {
-                p[column][row] = t[column][row];
-                p[row][column] = t[column][row];
-            }
-        }
+        self.turn_blocks(&pose, p);
         if D > POSE {
+            self.turn_rows_of_biases(&mut t);
+            for column in 0..POSE {
+                for row in POSE..D {
+                    p[column][row] = t[column][row];
+                    p[row][column] = t[column][row];
+                }
+            }
             for axis in 0..3 {
                 p[POSE + axis][POSE + axis] += noise.gyro_bias_psd * self.dt_s;
                 p[POSE + 3 + axis][POSE + 3 + axis] += noise.accel_bias_psd * self.dt_s;
             }
         }
+    }
+
+    /// The covariance of each input over the interval, were it constant: `psd / dt`.
+    #[inline(always)]
+    fn densities(&self, noise: &ImuNoise) -> [f64; INPUTS] {
+        // Over no time there is no noise, and no quotient.
+        let rate = if self.dt_s > 0.0 {
+            1.0 / self.dt_s
+        } else {
+            0.0
+        };
+        let (gyro, accel) = (noise.gyro_psd * rate, noise.accel_psd * rate);
+        [gyro, gyro, gyro, accel, accel, accel]
     }
 
     /// What each input adds to the pose, before the turn: the columns of `[N_0 0; N_1 A_1; N_2 A_2]`.
@@ -91,31 +111,34 @@ impl Transition {
         columns
     }
 
-    /// The columns of the pose in `P F^T`, before the turn; the rows from D on are zero.
+    /// The columns of the pose in `P F^T`, before the turn.
     #[inline(always)]
-    fn times_transposed<const D: usize, const R: usize>(
+    fn times_transposed<const D: usize>(
         &self,
         p: &[Column<D>; D],
         inputs: &[Column<POSE>; INPUTS],
-    ) -> [Column<R>; POSE] {
+    ) -> [Column<D>; POSE] {
         let [c_1, c_2] = &self.couplings;
-        let mut t = [[0.0; R]; POSE];
+        let mut t = [[0.0; D]; POSE];
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
             // (c x phi)_i = c_j phi_k - c_k phi_j
             let (phi_j, phi_k, nu) = (&p[j], &p[k], &p[3 + i]);
             if D == POSE {
-                t[i] = combined::<D, D, R, _>(&p[i], [], []);
-                t[3 + i] = combined::<D, D, R, _>(nu, [c_1[j], -c_1[k]], [phi_k, phi_j]);
+                t[i] = p[i];
+                t[3 + i] = combined::<D, _, _, _, _>(nu, [c_1[j], -c_1[k]], [phi_k, phi_j]);
                 let factors = [self.dt_s, c_2[j], -c_2[k]];
-                t[6 + i] = combined::<D, D, R, _>(&p[6 + i], factors, [nu, phi_k, phi_j]);
+                t[6 + i] = combined::<D, _, _, _, _>(&p[6 + i], factors, [nu, phi_k, phi_j]);
             } else {
                 let b = |n: usize| &p[POSE + n];
                 let f = |n: usize, row: usize| -inputs[n][row];
-                t[i] =
-                    combined::<D, D, R, _>(&p[i], [f(0, i), f(1, i), f(2, i)], [b(0), b(1), b(2)]);
+                t[i] = combined::<D, _, _, _, _>(
+                    &p[i],
+                    [f(0, i), f(1, i), f(2, i)],
+                    [b(0), b(1), b(2)],
+                );
                 let r = 3 + i;
-                t[r] = combined::<D, D, R, _>(
+                t[r] = combined::<D, _, _, _, _>(
                     nu,
                     [
                         c_1[j],
@@ -130,7 +153,7 @@ impl Transition {
                     [phi_k, phi_j, b(0), b(1), b(2), b(3), b(4), b(5)],
                 );
                 let r = 6 + i;
-                t[r] = combined::<D, D, R, _>(
+                t[r] = combined::<D, _, _, _, _>(
                     &p[r],
                     [
                         self.dt_s,
@@ -150,61 +173,21 @@ impl Transition {
         t
     }
 
-    /// The rows of the biases in T again, from row D on, less what the white noise of the input adds there:
-    /// `psd / dt` times the transpose of `inputs`.
+    /// The first rows of `F T` in one column, before the turn; the ROWS of them that are not zero reach the
+    /// diagonal. What the white noise of the input adds comes in as if it were a bias of covariance `psd / dt`.
     #[inline(always)]
-    fn append_noise<const D: usize, const R: usize>(
+    fn rows<const D: usize, const ROWS: usize>(
         &self,
-        t: &mut [Column<R>; POSE],
+        t: &Column<D>,
         inputs: &[Column<POSE>; INPUTS],
-        noise: &ImuNoise,
-    ) {
-        // Over no time there is no noise, and no quotient.
-        let rate = if self.dt_s > 0.0 {
-            1.0 / self.dt_s
-        } else {
-            0.0
-        };
-        let (gyro, accel) = (noise.gyro_psd * rate, noise.accel_psd * rate);
-        for column in 0..POSE {
-            for n in 0..INPUTS {
-                let known = if D > POSE { t[column][POSE + n] } else { 0.0 };
-                let psd = if n < 3 { gyro } else { accel };
-                t[column][D + n] = known - psd * inputs[n][column];
-            }
-        }
-    }
-
-    /// Each block of three columns times `E^T`.
-    #[inline(always)]
-    fn turn_columns<const R: usize>(&self, t: &mut [Column<R>; POSE]) {
-        let Some(e) = &self.turn else { return };
-        for block in t.chunks_exact_mut(3) {
-            let [x, y, z] = block else { continue };
-            for row in 0..R {
-                let (a, b, c) = (x[row], y[row], z[row]);
-                x[row] = e[(0, 0)] * a + e[(0, 1)] * b + e[(0, 2)] * c;
-                y[row] = e[(1, 0)] * a + e[(1, 1)] * b + e[(1, 2)] * c;
-                z[row] = e[(2, 0)] * a + e[(2, 1)] * b + e[(2, 2)] * c;
-            }
-        }
-    }
-
-    /// Puts the first rows of `F T` into one column of P, and into its row: ROWS of them are computed, which
-    /// reach the diagonal.
-    #[inline(always)]
-    fn finish<const D: usize, const R: usize, const ROWS: usize>(
-        &self,
-        p: &mut [Column<D>; D],
-        t: &Column<R>,
-        inputs: &[Column<POSE>; INPUTS],
+        densities: &[f64; INPUTS],
         column: usize,
-    ) {
-        let mut rows = [0.0; ROWS];
-        rows.copy_from_slice(&t[..ROWS]);
+    ) -> Column<POSE> {
+        let [c_1, c_2] = &self.couplings;
+        let mut rows = [0.0; POSE];
+        rows[..ROWS].copy_from_slice(&t[..ROWS]);
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            let [c_1, c_2] = &self.couplings;
             if ROWS > 3 {
                 rows[3 + i] += c_1[j] * t[k] - c_1[k] * t[j];
             }
@@ -212,26 +195,60 @@ impl Transition {
                 rows[6 + i] += c_2[j] * t[k] - c_2[k] * t[j] + self.dt_s * t[3 + i];
             }
         }
+        let less = |n: usize| {
+            let known = if D > POSE { t[POSE + n] } else { 0.0 };
+            densities[n] * inputs[n][column] - known
+        };
+        let [rate_x, rate_y, rate_z, force_x, force_y, force_z] = inputs;
         // The forces do not act on the rotation.
-        let acting = if ROWS > 3 { INPUTS } else { 3 };
-        for n in 0..acting {
-            let bias = t[D + n];
-            for row in 0..ROWS {
-                rows[row] -= inputs[n][row] * bias;
+        if ROWS > 3 {
+            let factors = [less(0), less(1), less(2), less(3), less(4), less(5)];
+            let columns = [rate_x, rate_y, rate_z, force_x, force_y, force_z];
+            combined::<ROWS, _, _, _, _>(&rows, factors, columns)
+        } else {
+            let factors = [less(0), less(1), less(2)];
+            combined::<ROWS, _, _, _, _>(&rows, factors, [rate_x, rate_y, rate_z])
+        }
+    }
+
+    /// Puts `E X E^T` for each block X of the upper triangle of `pose` into P, and its transpose below.
+    #[inline(always)]
+    fn turn_blocks<const D: usize>(&self, pose: &[Column<POSE>; POSE], p: &mut [Column<D>; D]) {
+        for (top, left) in [(0, 0), (0, 3), (0, 6), (3, 3), (3, 6), (6, 6)] {
+            let x = |i: usize, j: usize| pose[left + j][top + i];
+            let columns = match &self.turn {
+                Some(e) => {
+                    // The rows of X E^T, then the columns of E times that.
+                    let row = |i: usize| times(e, x(i, 0), x(i, 1), x(i, 2));
+                    let half = [row(0), row(1), row(2)];
+                    let column = |j: usize| times(e, half[0][j], half[1][j], half[2][j]);
+                    [column(0), column(1), column(2)]
+                }
+                None => {
+                    let column = |j: usize| [x(0, j), x(1, j), x(2, j)];
+                    [column(0), column(1), column(2)]
+                }
+            };
+            for (j, column) in columns.iter().enumerate() {
+                // Of a block on the diagonal the upper triangle counts.
+                let rows = if top == left { j + 1 } else { 3 };
+                for (i, entry) in column.iter().enumerate().take(rows) {
+                    p[left + j][top + i] = *entry;
+                    p[top + i][left + j] = *entry;
+                }
             }
         }
-        if let Some(e) = &self.turn {
-            for block in rows.chunks_exact_mut(3) {
-                let [x, y, z] = block else { continue };
-                let (a, b, c) = (*x, *y, *z);
-                *x = e[(0, 0)] * a + e[(0, 1)] * b + e[(0, 2)] * c;
-                *y = e[(1, 0)] * a + e[(1, 1)] * b + e[(1, 2)] * c;
-                *z = e[(2, 0)] * a + e[(2, 1)] * b + e[(2, 2)] * c;
+    }
+
+    /// Each block of three columns times `E^T`, in the rows of the biases.
+    #[inline(always)]
+    fn turn_rows_of_biases<const D: usize>(&self, t: &mut [Column<D>; POSE]) {
+        let Some(e) = &self.turn else { return };
+        for block in t.chunks_exact_mut(3) {
+            let [x, y, z] = block else { continue };
+            for row in POSE..D {
+                [x[row], y[row], z[row]] = times(e, x[row], y[row], z[row]);
             }
-        }
-        for row in 0..=column {
-            p[column][row] = rows[row];
-            p[row][column] = rows[row];
         }
     }
 }

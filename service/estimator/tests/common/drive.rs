@@ -1,7 +1,7 @@
 //! A car that weaves and changes speed, with fixes at 1 Hz: truth, samples, and a first belief whose heading
 //! is wrong.
 
-use inekf::filter::{Alignment, Belief, BiasPrior, Side, propagate};
+use inekf::filter::{Alignment, Belief, BiasPrior, InertialSide, propagate};
 use inekf::lie::{LieGroup, SE23, SO3};
 use inekf::model::{Discretisation, ImuInput, ImuNoise, ImuStep, PositionObservation};
 use nalgebra::{Matrix3, Vector3};
@@ -42,7 +42,7 @@ impl Drive {
     }
 
     /// A belief drawn from its own covariance, but for the heading.
-    pub fn belief<S: Side>(
+    pub fn belief<S: InertialSide>(
         &mut self,
         wrong_deg: f64,
         sigma_deg: f64,
@@ -72,7 +72,7 @@ impl Drive {
     }
 
     /// One second of samples for all `beliefs`, and the fix at its end.
-    pub fn second<S: Side>(
+    pub fn second<S: InertialSide>(
         &mut self,
         beliefs: &mut [Belief<SE23, S, 9>],
         fix_sigma_m: f64,

@@ -3,14 +3,14 @@
 use core::hint::black_box;
 
 use criterion::Criterion;
-use inekf::filter::{Belief, Left, Right, Side, propagate_in_place};
+use inekf::filter::{Belief, InertialSide, Left, Right, propagate_in_place};
 use inekf::lie::SE23;
 use inekf::model::{Discretisation, InertialState, NavState};
 
 use crate::dense;
 use crate::setup::{DT_S, GRAVITY_W, NOISE, assert_same, belief, in_place, sample, state};
 
-fn step<G: InertialState<D>, S: Side, const D: usize>(
+fn step<G: InertialState<D>, S: InertialSide, const D: usize>(
     belief: &mut Belief<G, S, D>,
     discretisation: Discretisation,
 ) {
@@ -18,7 +18,7 @@ fn step<G: InertialState<D>, S: Side, const D: usize>(
     propagate_in_place(belief, &measured, &GRAVITY_W, DT_S, discretisation, &NOISE);
 }
 
-fn pair<G: InertialState<D>, S: Side, const D: usize>(
+fn pair<G: InertialState<D>, S: InertialSide, const D: usize>(
     criterion: &mut Criterion,
     name: &str,
     start: Belief<G, S, D>,

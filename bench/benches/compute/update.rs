@@ -5,7 +5,7 @@ use core::hint::black_box;
 
 use criterion::Criterion;
 use inekf::filter::{
-    Belief, Constrained, Left, Right, Side, Transport, UpdateOptions, update, update_with,
+    Belief, Constrained, Gate, Left, Right, Side, Transport, UpdateOptions, update, update_with,
 };
 use inekf::lie::{SE2, SE23, SO2};
 use inekf::model::{
@@ -22,7 +22,7 @@ const THREE: UpdateOptions = UpdateOptions {
     iterations: 3,
     tolerance: 0.0,
     transport: Transport::Jacobian,
-    gate: f64::INFINITY,
+    gate: Gate::OPEN,
 };
 
 fn correct<G: InertialState<D>, S: Side, const D: usize>(

@@ -15,8 +15,8 @@ use std::path::Path;
 
 use anyhow::Context;
 use inekf::filter::{
-    Belief, Covariance, GainRule, Gate, InertialSide, Kalman, Left, Linearised, Right, Transport,
-    UpdateError, UpdateOptions, propagate, propagate_odometry, update_with,
+    Belief, Covariance, GainRule, Gate, InertialSide, Kalman, Left, Linearised, Right, Side,
+    Transport, UpdateError, UpdateOptions, propagate, propagate_odometry, update_with,
 };
 use inekf::lie::{LieGroup, SE2, SE23, SO3};
 use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState, PositionObservation};

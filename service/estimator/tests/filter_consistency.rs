@@ -5,7 +5,9 @@
 mod common;
 
 use common::{GRAVITY_W, normal, seeded};
-use inekf::filter::{Belief, Covariance, InertialSide, Left, UpdateOptions, propagate, update};
+use inekf::filter::{
+    Belief, Covariance, InertialSide, Left, Side, UpdateOptions, propagate, update,
+};
 use inekf::lie::{LieGroup, SE23, SO3, hat};
 use inekf::model::{Discretisation, ImuInput, ImuNoise, NavState, PositionObservation};
 use nalgebra::{Cholesky, Matrix3, SVector, Vector3};

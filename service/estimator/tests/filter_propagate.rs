@@ -8,7 +8,9 @@ use common::{
     GRAVITY_W, NOISE, any_belief, any_input, any_state, assert_same_covariance, assert_same_pose,
     normal, seeded,
 };
-use inekf::filter::{Additive, Belief, Covariance, Left, Right, Side, propagate, propagate_dense};
+use inekf::filter::{
+    Additive, Belief, Covariance, InertialSide, Left, Right, propagate, propagate_dense,
+};
 use inekf::lie::SE23;
 use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState, NavState};
 use nalgebra::{SVector, Vector3};
@@ -17,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 
 const SCHEMES: [Discretisation; 2] = [Discretisation::ZeroOrderHold, Discretisation::Euler];
 
-fn assert_one_step<G: InertialState<D>, S: Side, const D: usize>(
+fn assert_one_step<G: InertialState<D>, S: InertialSide, const D: usize>(
     belief: &Belief<G, S, D>,
     measured: &ImuInput,
     dt_s: f64,
@@ -37,7 +39,7 @@ fn assert_one_step<G: InertialState<D>, S: Side, const D: usize>(
     }
 }
 
-fn assert_steps<G: InertialState<D>, S: Side, const D: usize>(
+fn assert_steps<G: InertialState<D>, S: InertialSide, const D: usize>(
     side: &str,
     state: impl Fn(&mut ChaCha8Rng) -> G,
     seed: u64,

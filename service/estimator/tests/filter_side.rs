@@ -7,7 +7,7 @@ use common::{
     GRAVITY_W, NOISE, any_belief, any_input, any_pose, any_state, assert_close,
     assert_same_covariance, assert_within, derivative_at_zero, normal, seeded,
 };
-use inekf::filter::{Belief, Left, Right, Side, propagate};
+use inekf::filter::{Belief, InertialSide, Left, Right, Side, propagate};
 use inekf::lie::{LieGroup, SE23};
 use inekf::model::{Discretisation, InertialState, NavState};
 use nalgebra::SVector;
@@ -99,7 +99,7 @@ fn what_is_not_finite_is_implausible() {
 }
 
 /// `P+ = F P F^T + Q` with F the numerical derivative of the error of side S.
-fn assert_propagated<G: InertialState<D>, S: Side, const D: usize>(
+fn assert_propagated<G: InertialState<D>, S: InertialSide, const D: usize>(
     what: &str,
     start: G,
     rng: &mut ChaCha8Rng,

@@ -113,6 +113,7 @@ impl SO3 {
     }
 
     /// The rotation matrix, body to world: its columns are the body's axes in world coordinates.
+    #[inline]
     #[must_use]
     pub fn matrix(&self) -> Matrix3<f64> {
         let [x, y, z, w] = self.quaternion_xyzw();
@@ -130,6 +131,7 @@ impl SO3 {
     }
 
     /// Takes a vector from body to world coordinates, `R a`.
+    #[inline]
     #[must_use]
     pub fn rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
         let twice = 2.0 * self.vector.cross(a);
@@ -137,6 +139,7 @@ impl SO3 {
     }
 
     /// Takes a vector from world to body coordinates, `R^T a`.
+    #[inline]
     #[must_use]
     pub fn inverse_rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
         let twice = 2.0 * self.vector.cross(a);
@@ -145,6 +148,7 @@ impl SO3 {
 }
 
 /// `Jl(phi)^-1 a_i` on SO(3), without forming the matrix.
+#[inline]
 pub(super) fn left_jacobian_inverse_times<const K: usize>(
     phi: &Vector3<f64>,
     vectors: &[Vector3<f64>; K],
@@ -173,6 +177,7 @@ impl LieGroup<3> for SO3 {
         }
     }
 
+    #[inline]
     fn exp(phi: &Vector3<f64>) -> Self {
         let (cos, sinc) = cos_sinc(0.25 * phi.norm_squared());
         Self {
@@ -181,6 +186,7 @@ impl LieGroup<3> for SO3 {
         }
     }
 
+    #[inline]
     fn log(&self) -> Vector3<f64> {
         // Of the two quaternions, the one whose half angle is at most pi/2.
         let (vector, w) = if self.w < 0.0 {
@@ -189,14 +195,19 @@ impl LieGroup<3> for SO3 {
             (self.vector, self.w)
         };
         let sin_squared = vector.norm_squared();
-        // Below, atan2(s, w) = s/w to double precision, and s^2 may underflow.
-        if sin_squared < 1e-20 {
-            return (2.0 / w) * vector;
+        // For small angles atan2(s, w) by its series in (s/w)^2: no root, no arc tangent, and s^2 may underflow.
+        if sin_squared < 1e-3 {
+            let back = 1.0 / w;
+            let t = sin_squared * (back * back);
+            let series =
+                t * (1.0 / 3.0 - t * (0.2 - t * (1.0 / 7.0 - t * (1.0 / 9.0 - t * (1.0 / 11.0)))));
+            return (2.0 * back * (1.0 - series)) * vector;
         }
         let sin = sin_squared.sqrt();
         (2.0 * sin.atan2(w) / sin) * vector
     }
 
+    #[inline]
     fn compose(&self, other: &Self) -> Self {
         let vector =
             self.w * other.vector + other.w * self.vector + self.vector.cross(&other.vector);
@@ -209,6 +220,7 @@ impl LieGroup<3> for SO3 {
         }
     }
 
+    #[inline]
     fn inverse(&self) -> Self {
         Self {
             vector: -self.vector,

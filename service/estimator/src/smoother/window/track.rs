@@ -128,7 +128,11 @@ impl Track {
                 ]
             };
             let velocity = [at(3), at(4), at(5)];
-            let position = [0, 1, 2].map(|axis| at(6 + axis) + dt_s * velocity[axis]);
+            let position = [
+                at(6) + dt_s * velocity[0],
+                at(7) + dt_s * velocity[1],
+                at(8) + dt_s * velocity[2],
+            ];
             let parts = [turn, less_cross(&velocity, v), less_cross(&position, p)];
             for (block, part) in parts.iter().enumerate() {
                 for axis in 0..3 {

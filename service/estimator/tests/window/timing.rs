@@ -57,7 +57,7 @@ fn cost_s<G: InertialState<D>, const D: usize>(capacity: usize, covariance_w: Ma
     block(capacity);
     // Short blocks: some of them are not interrupted.
     let updates = 1_000 / capacity + 2;
-    (0..300)
+    (0..200)
         .map(|_| block(updates))
         .fold(f64::INFINITY, f64::min)
 }
@@ -99,7 +99,7 @@ fn timing() {
     println!(
         "states  constant gains  linearised anew  with biases   (us for a new state and its fix)"
     );
-    for capacity in [1, 10, 50, 200] {
+    for capacity in [1, 10, 50, 200, 1000] {
         let [constant, anew] =
             [isotropic, anisotropic].map(|noise| 1e6 * cost_s::<SE23, 9>(capacity, noise));
         let biased = 1e6 * cost_s::<NavState, 15>(capacity, isotropic);

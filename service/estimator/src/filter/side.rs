@@ -68,10 +68,12 @@ pub struct Right;
 impl Side for Left {
     type Residual = Self;
 
+    #[inline]
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G {
         chi.compose(&G::exp(xi))
     }
 
+    #[inline]
     fn difference<G: LieGroup<D>, const D: usize>(chi_hat: &G, chi: &G) -> SVector<f64, D> {
         chi_hat.between(chi).log()
     }

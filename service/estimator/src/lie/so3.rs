@@ -114,6 +114,7 @@ impl SO3 {
     }
 
     /// The rotation matrix, body to world: its columns are the body's axes in world coordinates.
+    #[inline]
     #[must_use]
     #[inline]
     pub fn matrix(&self) -> Matrix3<f64> {
@@ -132,6 +133,7 @@ impl SO3 {
     }
 
     /// Takes a vector from body to world coordinates, `R a`.
+    #[inline]
     #[must_use]
     #[inline]
     pub fn rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
@@ -140,6 +142,7 @@ impl SO3 {
     }
 
     /// Takes a vector from world to body coordinates, `R^T a`.
+    #[inline]
     #[must_use]
     #[inline]
     pub fn inverse_rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
@@ -196,9 +199,13 @@ impl LieGroup<3> for SO3 {
             (self.vector, self.w)
         };
         let sin_squared = vector.norm_squared();
-        // Below, atan2(s, w) = s/w to double precision, and s^2 may underflow.
-        if sin_squared < 1e-20 {
-            return (2.0 / w) * vector;
+        // For small angles atan2(s, w) by its series in (s/w)^2: no root, no arc tangent, and s^2 may underflow.
+        if sin_squared < 1e-3 {
+            let back = 1.0 / w;
+            let t = sin_squared * (back * back);
+            let series =
+                t * (1.0 / 3.0 - t * (0.2 - t * (1.0 / 7.0 - t * (1.0 / 9.0 - t * (1.0 / 11.0)))));
+            return (2.0 * back * (1.0 - series)) * vector;
         }
         let sin = sin_squared.sqrt();
         (2.0 * sin.atan2(w) / sin) * vector

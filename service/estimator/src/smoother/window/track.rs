@@ -24,10 +24,16 @@ pub(super) struct Track {
     upright: bool,
 }
 
+#[inline]
 fn split<const D: usize>(xi: &SVector<f64, D>) -> [Vector3<f64>; 3] {
-    [0, 3, 6].map(|start| Vector3::new(xi[start], xi[start + 1], xi[start + 2]))
+    [
+        Vector3::new(xi[0], xi[1], xi[2]),
+        Vector3::new(xi[3], xi[4], xi[5]),
+        Vector3::new(xi[6], xi[7], xi[8]),
+    ]
 }
 
+#[inline]
 fn join<const D: usize>(parts: &[Vector3<f64>; 3]) -> SVector<f64, D> {
     let mut xi = SVector::<f64, D>::zeros();
     for axis in 0..3 {
@@ -64,20 +70,23 @@ impl Track {
     }
 
     /// `F xi`, D = 9.
+    #[inline]
     pub fn carry<const D: usize>(&self, xi: &SVector<f64, D>) -> SVector<f64, D> {
         let [a, b, c] = split(xi);
         let (u, dt_s) = (&self.step.body, self.step.automorphism.dt_s);
-        let parts = [
-            a,
-            b - u.velocity.cross(&a),
-            c + b * dt_s - u.position.cross(&a),
-        ];
-        join(&parts.map(|part| self.turn.tr_mul(&part)))
+        let back = self.turn.transpose();
+        join(&[
+            back * a,
+            back * (b - u.velocity.cross(&a)),
+            back * (c + b * dt_s - u.position.cross(&a)),
+        ])
     }
 
     /// `F^T xi`, D = 9.
+    #[inline]
     pub fn carry_back<const D: usize>(&self, xi: &SVector<f64, D>) -> SVector<f64, D> {
-        let [a, b, c] = split(xi).map(|part| self.turn * part);
+        let [a, b, c] = split(xi);
+        let (a, b, c) = (self.turn * a, self.turn * b, self.turn * c);
         let (u, dt_s) = (&self.step.body, self.step.automorphism.dt_s);
         join(&[
             a + u.velocity.cross(&b) + u.position.cross(&c),
@@ -119,7 +128,11 @@ impl Track {
                 ]
             };
             let velocity = [at(3), at(4), at(5)];
-            let position = [0, 1, 2].map(|axis| at(6 + axis) + dt_s * velocity[axis]);
+            let position = [
+                at(6) + dt_s * velocity[0],
+                at(7) + dt_s * velocity[1],
+                at(8) + dt_s * velocity[2],
+            ];
             let parts = [turn, less_cross(&velocity, v), less_cross(&position, p)];
             for (block, part) in parts.iter().enumerate() {
                 for axis in 0..3 {

@@ -105,7 +105,11 @@ impl<G: InertialState<D>, S: Side, const D: usize> Model for Inertial<G, S, D> {
         self.imu.max_gap_ns
     }
 
-    fn sample(&self, message: &ImuSample, _before: &Preceding) -> Result<ImuInput, Refusal> {
+    fn sample(
+        &self,
+        message: &ImuSample,
+        _before: &Preceding<ImuInput>,
+    ) -> Result<ImuInput, Refusal> {
         intake::imu(message, &self.imu)
     }
 

@@ -47,7 +47,7 @@ pub fn build<U: Use>(
     fusion: FusionSettings,
     user: U,
 ) -> Result<U::Output, UpdateError> {
-    let (process, outputs) = mismatches(&config.mismatched);
+    let (process, outputs) = mismatches(&config.mismatched, config.model);
     let plan = Plan {
         config,
         rows: rows(config, odometry),
@@ -96,6 +96,7 @@ fn widened_sources(config: &Config, mut fusion: FusionSettings) -> FusionSetting
 /// The declared mismatches: those of the odometry, and those of the sources.
 fn mismatches(
     mismatched: &[Mismatched],
+    model: Model,
 ) -> (
     Vec<Declared<ProcessMismatch>>,
     Vec<Declared<OutputMismatch>>,
@@ -108,9 +109,12 @@ fn mismatches(
             Wrong::OdometryScale => of_process(ProcessMismatch::OdometryScale),
             Wrong::OdometryTurnScale => of_process(ProcessMismatch::OdometryTurnScale),
             Wrong::OdometryRotationBias { axis } => {
-                of_process(ProcessMismatch::OdometryRotationBias {
-                    axis: axis as usize,
-                });
+                // In the plane the rotation has one axis.
+                let axis = match model {
+                    Model::Odometry2d => 0,
+                    _ => axis as usize,
+                };
+                of_process(ProcessMismatch::OdometryRotationBias { axis });
             }
             Wrong::MeasurementScale { source } => {
                 of_source(OutputMismatch::MeasurementScale {
@@ -288,6 +292,7 @@ impl Plan<'_> {
         Ok(Learning {
             unknowns,
             parameters: self.parameters(),
+            declared: self.config.mismatched.len(),
             sigmas,
             walks: self.by_parameter(|mismatched| mismatched.walk),
             considers: self.config.mismatch == Mismatch::Consider,
@@ -305,6 +310,7 @@ impl Plan<'_> {
         Ok(Bank {
             unknowns,
             parameters: self.parameters(),
+            declared: self.config.mismatched.len(),
             modes,
             switching,
             options: self.fusion.update,

@@ -4,7 +4,7 @@ use inekf::filter::{Left, Right, UpdateError};
 use inekf::lie::SE23;
 use inekf::model::NavState;
 
-use super::engine::Engine;
+use super::driver::Engine;
 use super::inertial::InertialEngine;
 use super::model::Model;
 use super::odometry;

@@ -4,7 +4,7 @@
 //! The same inputs in the same order give the same bytes. After construction it does not allocate,
 //! lock, log or call the system.
 //!
-//! - [`engine`]: time, order, restarts; [`model`]: what it needs of a model; [`inertial`]: the model `imu`;
+//! - [`driver`]: time, order, restarts; [`model`]: what it needs of a model; [`inertial`]: the model `imu`;
 //!   [`odometry`]: the models `odometry2d` and `odometry3d`; [`mod@build`]: from a configuration to one of them
 //! - [`intake`]: checks; [`tally`]: counters; [`time_base`]: jumps of the clock
 //! - [`levelling`], [`set_state`]: the first state
@@ -12,12 +12,8 @@
 //!   [`recovery`]: out of a lock-out
 //! - [`output`]: the messages
 
-#[expect(
-    clippy::module_inception,
-    reason = "the engine is what the folder is about"
-)]
 pub mod build;
-pub mod engine;
+pub mod driver;
 pub mod fix;
 pub mod inertial;
 pub mod intake;
@@ -34,7 +30,7 @@ pub mod time_base;
 pub mod timeline;
 
 pub use build::{Use, build};
-pub use engine::{Engine, MAX_AHEAD_NS};
+pub use driver::{Engine, MAX_AHEAD_NS};
 pub use inertial::{Inertial, InertialEngine};
 pub use model::Model;
 pub use output::Outbox;

@@ -9,7 +9,7 @@ use inekf_shared::message::{
 };
 use nalgebra::Vector3;
 
-use super::engine::Engine;
+use super::driver::Engine;
 use super::fix::Fix;
 use super::levelling::Levelling;
 use super::model::{Fused, Model, Preceding};

@@ -8,7 +8,7 @@ use inekf::model::{Declared, OutputMismatch, PointFix, ProcessColumns, ProcessMi
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::super::build::Use;
-use super::super::engine::Engine;
+use super::super::driver::Engine;
 use super::super::fix::FixKind;
 use super::super::settings::{FusionSettings, InitialSettings, SourceSettings};
 use super::bank::Bank;

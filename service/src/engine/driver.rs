@@ -143,10 +143,8 @@ impl<M: Model> Engine<M> {
         self.last_input = Some((stamp_ns, input));
         self.missing = 0;
         self.output.answer(header.seq, header.sent_ns, received_ns);
-        if self.timeline.newest().is_none() {
-            if !self.try_start(stamp_ns, &input) {
-                return;
-            }
+        if self.timeline.newest().is_none() && !self.try_start(stamp_ns, &input) {
+            return;
         }
         self.take_early(outbox);
         self.unstack(stamp_ns, outbox);

@@ -1,7 +1,7 @@
 //! `[[mismatched]]`: what may be wrong with the models of odometry and measurement, and by how much.
 //!
-//! A mismatch is one unknown parameter, or three for a rotation about any axis, zero in the assumed model. The order
-//! of the tables is the order in which estimates report on them.
+//! A mismatch is one unknown parameter, or three for a rotation about any axis, zero in the assumed model. Estimates
+//! report on those of the odometry first, then on those of the sources, both in the order of the tables.
 
 use inekf_shared::message::MAX_MISMATCHES;
 

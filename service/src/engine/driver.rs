@@ -40,6 +40,8 @@ pub struct Engine<M: Model> {
     early: Vec<Fix<M::Measurement>>,
     /// The last accepted sample with its stamp.
     last_input: Option<(u64, M::Input)>,
+    /// Samples since then that were lost or refused.
+    missing: u64,
     output: Output<M::Estimate>,
 }
 
@@ -54,6 +56,7 @@ impl<M: Model> Engine<M> {
             requested: None,
             early: Vec::with_capacity(MAX_EARLY),
             last_input: None,
+            missing: 0,
             output: Output::new(fusion.degraded_after_ns),
             fusion,
             model,
@@ -105,9 +108,11 @@ impl<M: Model> Engine<M> {
         outbox: &mut impl Outbox<M::Estimate>,
     ) {
         let header = sample.header();
+        let lost = self.output.tally.receive(M::INPUT, header);
+        self.missing = self.missing.saturating_add(lost);
         let before = Preceding {
-            missing: self.output.tally.receive(M::INPUT, header),
-            stamp_ns: self.last_input.map(|(stamp_ns, _)| stamp_ns),
+            sample: self.last_input,
+            missing: self.missing,
         };
         let stamp_ns = header.stamp_ns;
         let checked = self.model.sample(sample, &before).and_then(|input| {
@@ -121,21 +126,27 @@ impl<M: Model> Engine<M> {
         });
         let (input, continuity) = match checked {
             Ok(checked) => checked,
-            Err(refusal) => return self.output.tally.refuse(refusal),
+            Err(refusal) => {
+                // What it said is missing from now on, unless it only repeats what was heard before.
+                if self
+                    .last_input
+                    .is_some_and(|(last_ns, _)| stamp_ns > last_ns)
+                {
+                    self.missing = self.missing.saturating_add(1);
+                }
+                return self.output.tally.refuse(refusal);
+            }
         };
         if continuity == Continuity::Restart {
             self.forget();
         }
         self.last_input = Some((stamp_ns, input));
+        self.missing = 0;
         self.output.answer(header.seq, header.sent_ns, received_ns);
-        if self.timeline.newest().is_none() {
-            if !self.try_start(stamp_ns, &input) {
-                return;
-            }
-            while let Some(fix) = self.early.pop() {
-                self.take(fix, outbox);
-            }
+        if self.timeline.newest().is_none() && !self.try_start(stamp_ns, &input) {
+            return;
         }
+        self.take_early(outbox);
         self.unstack(stamp_ns, outbox);
         if self
             .timeline
@@ -189,6 +200,7 @@ impl<M: Model> Engine<M> {
         self.time_base = TimeBase::new(self.model.restart_gap_ns());
         self.requested = None;
         self.last_input = None;
+        self.missing = 0;
         self.forget();
     }
 
@@ -255,6 +267,15 @@ impl<M: Model> Engine<M> {
         }
     }
 
+    /// Puts the fixes that came before the state on the timeline.
+    fn take_early(&mut self, outbox: &mut impl Outbox<M::Estimate>) {
+        let mut early = core::mem::take(&mut self.early);
+        for fix in early.drain(..) {
+            self.take(fix, outbox);
+        }
+        self.early = early;
+    }
+
     /// Lets go of the fixes whose partners have not come by `now_ns`.
     fn unstack(&mut self, now_ns: u64, outbox: &mut impl Outbox<M::Estimate>) {
         while let Some(fix) = self.stack.overdue(now_ns) {
@@ -282,7 +303,10 @@ impl<M: Model> Engine<M> {
         match insertion {
             Insertion::Waiting | Insertion::Judged => {}
             Insertion::TooLate => self.output.tally.counters.late += fix.count(),
-            Insertion::Full => self.output.tally.refuse(Refusal(REASON_BUFFER_FULL)),
+            Insertion::Full => {
+                let tally = &mut self.output.tally;
+                tally.refuse_all(Refusal(REASON_BUFFER_FULL), fix.count());
+            }
         }
     }
 
@@ -370,12 +394,11 @@ impl<M: Model> Engine<M> {
     /// Forgets the state. The fixes that still waited for a sample are counted, as every input is.
     fn forget(&mut self) {
         let waiting = self.timeline.waiting()
-            + self.stack.clear()
-            + self.early.len()
-            + usize::from(self.first_position.is_some());
-        for _ in 0..waiting {
-            self.output.tally.refuse(Refusal(REASON_NOT_READY));
-        }
+            + self.stack.clear() as u64
+            + self.early.len() as u64
+            + u64::from(self.first_position.is_some());
+        let tally = &mut self.output.tally;
+        tally.refuse_all(Refusal(REASON_NOT_READY), waiting);
         self.timeline.clear();
         self.early.clear();
         self.model.forget_attitude();

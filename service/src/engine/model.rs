@@ -21,10 +21,10 @@ use super::tally::Refusal;
 
 /// What came before a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Preceding {
-    /// Stamp of the last accepted sample, nanoseconds; `None` at the start.
-    pub stamp_ns: Option<u64>,
-    /// Samples lost since, from the gap in `seq`.
+pub struct Preceding<I> {
+    /// The last accepted sample with its stamp, nanoseconds; `None` at the start.
+    pub sample: Option<(u64, I)>,
+    /// Samples since then that were lost, by the gap in `seq`, or refused.
     pub missing: u64,
 }
 
@@ -67,7 +67,11 @@ pub trait Model: Debug + Sized {
     ///
     /// # Errors
     /// By reason; see `inekf_shared::message::REASON_*`.
-    fn sample(&self, message: &Self::Sample, before: &Preceding) -> Result<Self::Input, Refusal>;
+    fn sample(
+        &self,
+        message: &Self::Sample,
+        before: &Preceding<Self::Input>,
+    ) -> Result<Self::Input, Refusal>;
 
     /// Checks a position fix.
     ///

@@ -105,7 +105,7 @@ impl<E: EstimateMessage> Output<E> {
                 replayed,
             } => {
                 let Ok(fused) = outcome else {
-                    self.tally.refuse(Refusal(REASON_INTERNAL));
+                    self.tally.refuse_all(Refusal(REASON_INTERNAL), fix.count());
                     return;
                 };
                 self.note_nis(fix, fused);

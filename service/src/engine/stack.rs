@@ -67,15 +67,15 @@ impl<Z: Measurement> Stack<Z> {
         if fix.kind() != FixKind::Position || !settings.sources.contains(&fix.source) {
             return Offered::Ready(fix);
         }
-        let partner = self.waiting.iter().position(|other| {
-            other.source != fix.source
-                && other.stamp_ns.abs_diff(fix.stamp_ns) <= settings.tolerance_ns
+        let apart_ns = |other: &Fix<Z>| other.stamp_ns.abs_diff(fix.stamp_ns);
+        let others = self.waiting.iter().enumerate().filter(|(_, other)| {
+            other.source != fix.source && apart_ns(other) <= settings.tolerance_ns
         });
-        if let Some(index) = partner {
-            let other = self.waiting.remove(index);
-            if let Some(pair) = settings.pair(&other, &fix) {
-                return Offered::Ready(pair);
-            }
+        let nearest = others.min_by_key(|(_, other)| apart_ns(other));
+        let pair = nearest.and_then(|(index, other)| Some((index, settings.pair(other, &fix)?)));
+        if let Some((index, pair)) = pair {
+            self.waiting.remove(index);
+            return Offered::Ready(pair);
         }
         let displaced = (self.waiting.len() >= CAPACITY).then(|| self.waiting.remove(0));
         self.waiting.push(fix);

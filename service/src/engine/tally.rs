@@ -59,9 +59,14 @@ impl Tally {
 
     /// Counts a refusal.
     pub fn refuse(&mut self, refusal: Refusal) {
-        self.counters.rejected += 1;
+        self.refuse_all(refusal, 1);
+    }
+
+    /// Counts the refusal of so many messages.
+    pub fn refuse_all(&mut self, refusal: Refusal, messages: u64) {
+        self.counters.rejected += messages;
         if let Some(count) = self.rejected_by_reason.get_mut(refusal.0 as usize) {
-            *count += 1;
+            *count += messages;
         }
     }
 }

@@ -116,13 +116,14 @@ impl<M: Model> Timeline<M> {
         self.gated_in_a_row = Default::default();
     }
 
-    /// Number of fixes that lie ahead of the newest knot.
-    pub fn waiting(&self) -> usize {
+    /// Number of messages whose fixes lie ahead of the newest knot.
+    pub fn waiting(&self) -> u64 {
         let newest_ns = self.knots.back().map_or(0, |knot| knot.stamp_ns);
         let passed = self
             .entries
             .partition_point(|entry| entry.fix.stamp_ns <= newest_ns);
-        self.entries.len() - passed
+        let ahead = &self.entries[passed..];
+        ahead.iter().map(|entry| entry.fix.count()).sum()
     }
 
     /// The newest stamp and state, if started.

@@ -220,16 +220,22 @@ pub const MAX_PROCESS_MISMATCHES: usize = 5;
 /// How many standard deviations of its own noise a travelled way, or a turn, must exceed to tell of a scale.
 const GATE_SIGMAS: f64 = 5.0;
 
+/// A lever below a micrometre, m^2, is rounding.
+const NO_LEVER_M2: f64 = 1e-12;
+
 /// T, summed over the steps since the last update: `d <- Ad_{kappa^-1} d + d_kappa / m`.
 ///
 /// The columns are left-invariant, at the end of the last step. A scale's column is withheld while the way (or
 /// the turn) is below five standard deviations of the noise of the steps: standing still, or going straight on,
-/// its direction is noise.
+/// its direction is noise. A bias turns the body where it stands, which no position tells until the body has moved:
+/// then no gain meets `L H d = d`, and the column waits for an update that sees it
+/// ([`hide_unseen`](Self::hide_unseen)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProcessColumns<const D: usize> {
     declared: [Option<Declared<ProcessMismatch>>; MAX_PROCESS_MISMATCHES],
     columns: [SVector<f64, D>; MAX_PROCESS_MISMATCHES],
     above_noise: [bool; MAX_PROCESS_MISMATCHES],
+    hidden: [bool; MAX_PROCESS_MISMATCHES],
     /// Variance of the steps' translation, m^2, and rotation, rad^2, along one axis.
     way_variance: f64,
     turn_variance: f64,
@@ -245,6 +251,7 @@ impl<const D: usize> ProcessColumns<D> {
             declared: core::array::from_fn(|i| declared.get(i).copied()),
             columns: [SVector::zeros(); MAX_PROCESS_MISMATCHES],
             above_noise: [true; MAX_PROCESS_MISMATCHES],
+            hidden: [false; MAX_PROCESS_MISMATCHES],
             way_variance: 0.0,
             turn_variance: 0.0,
         })
@@ -293,9 +300,35 @@ impl<const D: usize> ProcessColumns<D> {
         Some(columns)
     }
 
-    /// Forgets the way: after an update.
+    /// Hides the hard constraints on biases of which an observation with the Jacobian `h` (M x D, left-invariant) sees
+    /// too little: the lever `|H d| / |rotation of d|`, m, is below five standard deviations of the way's noise. They
+    /// are hidden from one update, and what they have gathered outlasts the [`reset`](Self::reset) after it: a gain
+    /// leaves an error as it is that the observation does not see, `(I - L H) d = d`.
+    pub fn hide_unseen<G: RigidPose<D, N>, const N: usize, const M: usize>(
+        &mut self,
+        h: &SMatrix<f64, M, D>,
+    ) {
+        let lever_variance = (GATE_SIGMAS * GATE_SIGMAS * self.way_variance).max(NO_LEVER_M2);
+        for (i, declared) in self.declared.iter().enumerate() {
+            let Some(Declared { mismatch, sigma }) = declared else {
+                continue;
+            };
+            let is_bias = matches!(mismatch, ProcessMismatch::OdometryRotationBias { .. });
+            let column = &self.columns[i];
+            let turn = column.rows(0, G::ROTATION_DIM).norm_squared();
+            let unseen = (h * column).norm_squared() <= lever_variance * turn;
+            self.hidden[i] = is_bias && sigma.is_infinite() && turn > 0.0 && unseen;
+        }
+    }
+
+    /// Forgets the way: after an update. What was hidden from it goes on.
     pub fn reset(&mut self) {
-        self.columns = [SVector::zeros(); MAX_PROCESS_MISMATCHES];
+        for (column, hidden) in self.columns.iter_mut().zip(&self.hidden) {
+            if !hidden {
+                *column = SVector::zeros();
+            }
+        }
+        self.hidden = [false; MAX_PROCESS_MISMATCHES];
         self.above_noise = [true; MAX_PROCESS_MISMATCHES];
         self.way_variance = 0.0;
         self.turn_variance = 0.0;
@@ -309,22 +342,25 @@ impl<const D: usize> ProcessColumns<D> {
         }
     }
 
-    /// Bit i is set where the column of mismatch i stands above its noise.
+    fn is_active(&self, index: usize) -> bool {
+        self.above_noise[index] && !self.hidden[index]
+    }
+
+    /// Bit i is set where the column of mismatch i stands above its noise and is not hidden.
     pub fn active_bits(&self) -> u32 {
-        let declared = self.declared.iter().zip(&self.above_noise).enumerate();
+        let declared = self.declared.iter().enumerate();
         declared
-            .filter(|(_, (declared, above_noise))| declared.is_some() && **above_noise)
+            .filter(|(i, declared)| declared.is_some() && self.is_active(*i))
             .fold(0, |bits, (i, _)| bits | 1 << i)
     }
 
-    /// The columns that stand above their noise, each with what was declared.
+    /// The columns that stand above their noise and are not hidden, each with what was declared.
     pub fn active(
         &self,
     ) -> impl Iterator<Item = (Declared<ProcessMismatch>, SVector<f64, D>)> + '_ {
-        let columns = self.declared.iter().zip(&self.columns);
+        let columns = self.declared.iter().zip(&self.columns).enumerate();
         columns
-            .zip(&self.above_noise)
-            .filter(|(_, above_noise)| **above_noise)
-            .filter_map(|((declared, column), _)| declared.map(|declared| (declared, *column)))
+            .filter(|(i, _)| self.is_active(*i))
+            .filter_map(|(_, (declared, column))| declared.map(|declared| (declared, *column)))
     }
 }

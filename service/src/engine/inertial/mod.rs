@@ -105,7 +105,11 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
         self.imu.max_gap_ns
     }
 
-    fn sample(&self, message: &ImuSample, _before: &Preceding) -> Result<ImuInput, Refusal> {
+    fn sample(
+        &self,
+        message: &ImuSample,
+        _before: &Preceding<ImuInput>,
+    ) -> Result<ImuInput, Refusal> {
         intake::imu(message, &self.imu)
     }
 

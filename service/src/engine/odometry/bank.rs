@@ -20,6 +20,8 @@ pub struct Bank<const P: usize, const A: usize> {
     pub unknowns: Unknowns,
     /// How many of them mean something.
     pub parameters: usize,
+    /// How many mismatches these belong to: one may have three.
+    pub declared: usize,
     /// The hypotheses.
     pub modes: [Mode<P>; STANDARD_MODES],
     /// How they follow each other.
@@ -71,7 +73,7 @@ where
         let weighed = state.bank.update_through(&seen, &options.gate)?;
         if weighed.verdict == Verdict::Accepted {
             state.merged = state.bank.estimate();
-            state.active = bits(self.parameters);
+            state.active = bits(self.declared);
         }
         Ok(Fused {
             verdict: weighed.verdict,

@@ -292,6 +292,7 @@ impl Plan<'_> {
         Ok(Learning {
             unknowns,
             parameters: self.parameters(),
+            declared: self.config.mismatched.len(),
             sigmas,
             walks: self.by_parameter(|mismatched| mismatched.walk),
             considers: self.config.mismatch == Mismatch::Consider,
@@ -309,6 +310,7 @@ impl Plan<'_> {
         Ok(Bank {
             unknowns,
             parameters: self.parameters(),
+            declared: self.config.mismatched.len(),
             modes,
             switching,
             options: self.fusion.update,

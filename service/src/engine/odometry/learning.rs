@@ -22,6 +22,8 @@ pub struct Learning<const P: usize, const A: usize> {
     pub unknowns: Unknowns,
     /// How many of them mean something.
     pub parameters: usize,
+    /// How many mismatches these belong to: one may have three.
+    pub declared: usize,
     /// Their standard deviations at the start; zero for those that mean nothing.
     pub sigmas: SVector<f64, P>,
     /// Their random walks, per square root of a second.
@@ -62,7 +64,7 @@ pub fn pose<G: LieGroup<D>, const D: usize, const P: usize, const A: usize>(
     Belief::new(belief.mean.pose, Covariance::from_upper(own.into_owned()))
 }
 
-/// One bit for each of `count` parameters.
+/// One bit for each of `count` mismatches.
 pub fn bits(count: usize) -> u32 {
     (1 << count.min(MAX_MISMATCHES)) - 1
 }
@@ -115,7 +117,7 @@ where
             update(&mut state.belief, &seen, options)
         }?;
         if correction.verdict == Verdict::Accepted {
-            state.active = bits(self.parameters);
+            state.active = bits(self.declared);
         }
         Ok(Fused {
             verdict: correction.verdict,

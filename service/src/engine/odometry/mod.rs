@@ -108,7 +108,7 @@ where
         self.rows.max_gap_ns
     }
 
-    fn sample(&self, message: &G::Row, before: &Preceding) -> Result<Row<D>, Refusal> {
+    fn sample(&self, message: &G::Row, before: &Preceding<Row<D>>) -> Result<Row<D>, Refusal> {
         let increment = G::increment(message);
         if !increment.iter().all(|part| part.is_finite()) {
             return Err(Refusal(REASON_NOT_FINITE));
@@ -118,19 +118,18 @@ where
         if turn.norm() > self.rows.max_rotation || way.amax() > self.rows.max_translation {
             return Err(Refusal(REASON_OUT_OF_RANGE));
         }
-        let interval_ns = before.stamp_ns.map_or(0, |stamp_ns| {
-            message.header().stamp_ns.saturating_sub(stamp_ns)
+        let stamp_ns = message.header().stamp_ns;
+        let continued = before.sample.and_then(|(before_ns, row)| {
+            let interval_ns = stamp_ns.saturating_sub(before_ns);
+            let known = (1..=self.rows.restart_gap_ns).contains(&interval_ns);
+            known.then(|| Row::after(&row, increment, interval_ns, before.missing))
         });
-        let known = (1..=self.rows.restart_gap_ns).contains(&interval_ns);
-        let span_ns = if known {
-            interval_ns / before.missing.saturating_add(1)
-        } else {
-            self.rows.first_period_ns
-        };
-        Ok(Row {
+        Ok(continued.unwrap_or(Row {
             increment,
-            span_ns: span_ns.max(1),
-        })
+            // Time begins at zero.
+            span_ns: self.rows.first_period_ns.min(stamp_ns).max(1),
+            follows_loss: false,
+        }))
     }
 
     fn position(&self, message: &PositionFix) -> Result<Fix<Sighting<N>>, Refusal> {

@@ -17,6 +17,28 @@ pub struct Row<const D: usize> {
     pub increment: SVector<f64, D>,
     /// The time it speaks for, nanoseconds.
     pub span_ns: u64,
+    /// Whether rows before it are missing.
+    pub follows_loss: bool,
+}
+
+impl<const D: usize> Row<D> {
+    /// The row with `increment` that comes `interval_ns` nanoseconds after `before`, `missing` rows between them.
+    ///
+    /// It speaks for an even share of the interval, but for no less than half of what the row before did: a number
+    /// that leaps by thousands is a fault of the sender, and would multiply the motion by thousands.
+    pub fn after(
+        before: &Self,
+        increment: SVector<f64, D>,
+        interval_ns: u64,
+        missing: u64,
+    ) -> Self {
+        let share_ns = interval_ns / missing.saturating_add(1);
+        Self {
+            increment,
+            span_ns: share_ns.max(before.span_ns / 2).min(interval_ns).max(1),
+            follows_loss: missing > 0,
+        }
+    }
 }
 
 /// The motion between two rows.
@@ -84,7 +106,8 @@ impl<G, const D: usize> RowMotion<G, D> {
         G: RigidPose<D, N>,
     {
         let dt_s = seconds(row.span_ns);
-        let says_too_little = interval_ns > row.span_ns || interval_ns > max_gap_ns;
+        let says_too_little =
+            row.follows_loss || interval_ns > row.span_ns || interval_ns > max_gap_ns;
         let doubt = if says_too_little {
             // A rate that is wrong over the whole interval: its square grows with the interval's length.
             let square = |sigma: f64| sigma * sigma * seconds(interval_ns);

@@ -100,7 +100,7 @@ pub fn checked<const N: usize>(
             covariance_w_m2[6 + k] = 0.0;
             covariance_w_m2[3 * k + 2] = 0.0;
         }
-        covariance_w_m2[8] = 1.0;
+        covariance_w_m2[8] = covariance_w_m2[0];
     }
     let position_w = bounded(position_w_m, MAX_POSITION_M)?;
     let covariance_w = covariance(&covariance_w_m2, settings)?;

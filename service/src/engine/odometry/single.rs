@@ -2,7 +2,8 @@
 //!
 //! Constraints are made anew at each update from what was declared: the process's from the way since the last
 //! update, the sources' from those that are part of it. A source of a stack that comes alone has too few outputs for
-//! the constraints of the stack, and is fused without any; the way's columns `d` then go on as `(I - K H) d`.
+//! the constraints of the stack, and is fused without any; the way's columns `d` then go on as `(I - K H) d`. A column
+//! that the fix does not see (a bias while the body rests: `H d = 0`) goes on as it is.
 
 use inekf::filter::{
     Belief, Constrained, GainRule, HInfinity, Kalman, Left, Linearised, Side, UpdateError,
@@ -157,8 +158,10 @@ where
         let correction = if self.constrains(sources) {
             let outputs = self.of_sources(sources);
             let declared = &outputs.declared[..outputs.count];
-            let rule = Constrained::new(&state.belief, &state.way, declared, points);
-            next.active = outputs.active | state.way.active_bits();
+            let h = Observation::<G, D, M>::left_jacobian(points, &state.belief.mean);
+            next.way.hide_unseen::<G, N, M>(&h);
+            let rule = Constrained::new(&state.belief, &next.way, declared, points);
+            next.active = outputs.active | next.way.active_bits();
             next.way.reset();
             update_with(&mut next.belief, points, &rule, options)
         } else if let Gain::HInfinity(rule) = self.gain {

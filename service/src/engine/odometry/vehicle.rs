@@ -110,7 +110,7 @@ impl Vehicle<3, 2> for SE2 {
 
     fn of_state(r_wb: &SO3, state: &StateVector) -> Result<Self, &'static str> {
         let up_w = r_wb.rotate(&Vector3::z());
-        if up_w.xy().norm() > MAX_LEAN_RAD {
+        if up_w.xy().norm() > MAX_LEAN_RAD || up_w.z < 0.0 {
             return Err("the attitude of a planar state must be a turn about the vertical");
         }
         Ok(Self::of_navigation(r_wb, &state.p_w_m.into()))

@@ -13,7 +13,7 @@ use inekf_shared::message::{
 };
 
 /// A CSV file as rows of numbers, empty cells as NaN.
-fn csv(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
+pub fn csv(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
     let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let mut lines = text.lines();
     let header = lines
@@ -32,14 +32,14 @@ fn csv(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
 }
 
 /// Rows and fixes of a planar recording.
-struct Recording {
-    rows: Vec<Odometry2d>,
-    fixes: Vec<PositionFix>,
-    state: Option<StateVector>,
+pub struct Recording {
+    pub rows: Vec<Odometry2d>,
+    pub fixes: Vec<PositionFix>,
+    pub state: Option<StateVector>,
 }
 
 impl Recording {
-    fn load(dir: &Path) -> Self {
+    pub fn load(dir: &Path) -> Self {
         let header = |seq: usize, stamp: f64| Header {
             stamp_ns: stamp as u64,
             seq: seq as u64,
@@ -126,7 +126,7 @@ impl Use for Feed<'_> {
     }
 }
 
-fn config(name: &str) -> Config {
+pub fn config(name: &str) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("config/{name}.toml"));
     Config::load(&path).unwrap()
 }
@@ -135,7 +135,7 @@ fn run(config: &Config, recording: &Recording) -> Vec<EstimateSe2> {
     build(config, Feed(recording)).unwrap()
 }
 
-fn datasets() -> Option<PathBuf> {
+pub fn datasets() -> Option<PathBuf> {
     let folder = std::env::var_os("INEKF_DATASETS").map(PathBuf::from);
     if folder.is_none() {
         println!("skipped: INEKF_DATASETS is not set");
@@ -144,7 +144,7 @@ fn datasets() -> Option<PathBuf> {
 }
 
 /// A planar run with the initial state of its meta.json.
-fn planar(dir: &Path) -> Recording {
+pub fn planar(dir: &Path) -> Recording {
     let text = std::fs::read_to_string(dir.join("meta.json")).unwrap();
     let after = |key: &str| -> f64 {
         let start = text.find(key).unwrap() + key.len();

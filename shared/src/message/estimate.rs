@@ -116,8 +116,9 @@ pub struct EstimateHead {
     pub source: u32,
     /// Dimension of the covariance: 15 or 9 (SE_2(3)), 6 (SE(3)), 3 (SE(2)).
     pub dimension: u32,
-    /// Bit i: the last update of this estimate allowed for mismatch i of the configuration (a constraint of the
-    /// gain, or a parameter beside the pose). Zero where none is declared.
+    /// Bit i: the last update of this estimate allowed for mismatch i (a constraint of the gain, or parameters beside
+    /// the pose): those of the odometry first, then those of the sources, each in the order of the configuration.
+    /// Zero where none is declared.
     pub active_mismatches: u32,
     /// With adaptive mismatches, the likeliest mode (`inekf::filter::standard_modes`); else [`NO_MODE`].
     pub mode: u32,
@@ -188,8 +189,8 @@ pub struct EstimateSe3 {
     pub p_w_m: [f64; 3],
     /// Upper triangle of the covariance: rotation, position.
     pub covariance: [f64; SE3_TRI],
-    /// Estimated parameters of the declared mismatches, in the order of the configuration and each in its own unit;
-    /// NaN where none is estimated.
+    /// Estimated parameters of the declared mismatches, those of the odometry first, then those of the sources, each
+    /// in its own unit; NaN where none is estimated.
     pub mismatch: [f64; MAX_MISMATCHES],
     /// Their standard deviations.
     pub mismatch_sigma: [f64; MAX_MISMATCHES],
@@ -214,8 +215,8 @@ pub struct EstimateSe2 {
     pub p_w_m: [f64; 2],
     /// Upper triangle of the covariance: theta, x, y.
     pub covariance: [f64; SE2_TRI],
-    /// Estimated parameters of the declared mismatches, in the order of the configuration and each in its own unit;
-    /// NaN where none is estimated.
+    /// Estimated parameters of the declared mismatches, those of the odometry first, then those of the sources, each
+    /// in its own unit; NaN where none is estimated.
     pub mismatch: [f64; MAX_MISMATCHES],
     /// Their standard deviations.
     pub mismatch_sigma: [f64; MAX_MISMATCHES],

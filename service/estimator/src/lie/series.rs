@@ -78,7 +78,6 @@ fn horner<const TERMS: usize>(coefficients: &[f64; TERMS], t: f64) -> f64 {
 /// `S_0 ..= S_6` at `t = theta^2 >= 0`, each to double precision.
 #[inline]
 #[must_use]
-#[inline]
 pub fn entire(t: f64) -> [f64; COUNT] {
     const C5_SMALL: [f64; TERMS_SMALL] = coefficients(5);
     const C6_SMALL: [f64; TERMS_SMALL] = coefficients(6);
@@ -107,7 +106,6 @@ pub fn entire(t: f64) -> [f64; COUNT] {
 /// `S_0 = cos(theta)` and `S_1 = sin(theta) / theta` alone, at `t = theta^2 >= 0`.
 #[inline]
 #[must_use]
-#[inline]
 pub fn cos_sinc(t: f64) -> (f64, f64) {
     const TERMS: usize = 7;
     const C0: [f64; TERMS] = coefficients(0);
@@ -128,7 +126,6 @@ pub fn cos_sinc(t: f64) -> (f64, f64) {
 /// difference of nearly equal numbers at 0, and no division by `sin(pi)`. It is infinite at 2 pi.
 #[inline]
 #[must_use]
-#[inline]
 pub fn inverse_jacobian_coefficient(t: f64) -> f64 {
     // |B_2n| / (2n)!, of which the next is 5e-10: below one rounding here.
     const SMALL: [f64; 5] = [
@@ -158,7 +155,6 @@ impl RotationSeries {
     /// Evaluates the functions at the rotation vector `phi`, in radians.
     #[inline]
     #[must_use]
-    #[inline]
     pub fn at(phi: &Vector3<f64>) -> Self {
         Self {
             phi: *phi,
@@ -197,7 +193,6 @@ impl RotationSeries {
     /// The vector `Gamma_M(phi) a`, without forming the matrix.
     #[inline]
     #[must_use]
-    #[inline]
     pub fn gamma_times<const M: usize>(&self, a: &Vector3<f64>) -> Vector3<f64> {
         const { assert!(M <= 2) };
         let p_a = self.phi.cross(a);

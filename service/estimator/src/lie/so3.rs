@@ -116,7 +116,6 @@ impl SO3 {
     /// The rotation matrix, body to world: its columns are the body's axes in world coordinates.
     #[inline]
     #[must_use]
-    #[inline]
     pub fn matrix(&self) -> Matrix3<f64> {
         let [x, y, z, w] = self.quaternion_xyzw();
         let (x2, y2, z2) = (x + x, y + y, z + z);
@@ -135,7 +134,6 @@ impl SO3 {
     /// Takes a vector from body to world coordinates, `R a`.
     #[inline]
     #[must_use]
-    #[inline]
     pub fn rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
         let twice = 2.0 * self.vector.cross(a);
         a + self.w * twice + self.vector.cross(&twice)
@@ -144,7 +142,6 @@ impl SO3 {
     /// Takes a vector from world to body coordinates, `R^T a`.
     #[inline]
     #[must_use]
-    #[inline]
     pub fn inverse_rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
         let twice = 2.0 * self.vector.cross(a);
         a - self.w * twice + self.vector.cross(&twice)

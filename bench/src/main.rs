@@ -1,5 +1,6 @@
 //! `inekf-bench`: measures the estimation service, and repeats the papers' experiments.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -52,7 +53,7 @@ enum Command {
         /// Length of a step in the plane, s (lc-inekf, parametrisation).
         #[arg(long, default_value_t = 0.1, value_name = "SECONDS")]
         dt: f64,
-        /// Leave out the adaptive bank, which costs more than all other filters together (lc-inekf).
+        /// Leave out the adaptive bank, which costs as much as all other filters together (lc-inekf).
         #[arg(long)]
         without_adaptive: bool,
         /// Only this form of the prior that marginalisation leaves, instead of all (alignment, marginalisation).
@@ -103,8 +104,10 @@ fn run(command: Command) -> anyhow::Result<()> {
                 adaptive: !without_adaptive,
                 prior,
             };
-            print!("{}", experiment::run(name, &options, &out)?);
-            println!("\nwritten to {}", out.display());
+            let tables = experiment::run(name, &options, &out)?;
+            let mut stdout = std::io::stdout().lock();
+            stdout.write_all(tables.as_bytes())?;
+            writeln!(stdout, "\nwritten to {}", out.display())?;
             Ok(())
         }
         Command::Latency {

@@ -239,7 +239,7 @@ fn the_alignment_is_that_of_the_paper() {
 #[test]
 fn marginalisation_with_a_frozen_prior_sets_parametrisations_apart() {
     let rows = marginalisation::compare(&Options::new(2, 0)).expect("a comparison");
-    assert_eq!(rows.len(), 3 * 15);
+    assert_eq!(rows.len(), 3 * 15 + 3);
     for row in rows {
         let linked = row.pair != Pair::LeftGtsam;
         let one_cost = match row.scheme {
@@ -248,9 +248,15 @@ fn marginalisation_with_a_frozen_prior_sets_parametrisations_apart() {
                 capacity, prior, ..
             } => capacity.is_none() || prior == Prior::Recentred,
         };
+        // The filter and the window have converged to that, no further.
+        let bound = if row.pair == Pair::FilterLeft {
+            1e-6
+        } else {
+            1e-8
+        };
         let mean = row.most.mean;
         if linked && one_cost {
-            assert!(mean < 1e-8, "{:?}, {:?}: {mean}", row.pair, row.scheme);
+            assert!(mean < bound, "{:?}, {:?}: {mean}", row.pair, row.scheme);
         } else {
             assert!(mean > 1e-4, "{:?}, {:?}: {mean}", row.pair, row.scheme);
         }

@@ -3,7 +3,8 @@
 //! * Proposition 3: smoothing of a whole drive is not affected, iteration by iteration.
 //! * Proposition 4: marginalisation sets them apart. That is so for a frozen prior; one that the exact Jacobians carry
 //!   along is the same term of the cost in any coordinates.
-//! * Corollary 1: an iterated filter is a window of one state, and is set apart the same way.
+//! * Corollary 1: an iterated filter is a window of one state, and is set apart the same way. Which filter is which
+//!   window: with transport of the covariance, the one with a prior that the Jacobians carry along.
 //!
 //! The drive is [`imu_drive`](super::imu_drive). Compared is the newest state after each fix, as
 //! [`apart`](super::apart) says; the batch begins by dead reckoning, and is compared after each iteration.
@@ -15,7 +16,9 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::Context;
-use inekf::filter::{Belief, Forster, Gtsam, Left, Right, Side};
+use inekf::filter::{
+    Belief, Forster, Gate, Gtsam, Left, Right, Side, Transport, UpdateOptions, update_with,
+};
 use inekf::lie::SE23;
 use inekf::model::PositionObservation;
 use inekf::smoother::{
@@ -28,6 +31,7 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use super::apart::Apart;
 use super::figures::{self, Mark, Panel, Scale, Series};
 use super::imu_drive::ImuDrive;
+use super::parametrisation::WholeSteps;
 use super::section7::stream;
 use super::{Options, Prior, progress, write};
 
@@ -47,16 +51,19 @@ pub enum Pair {
     GtsamForster,
     /// `chi exp(xi)` and \[IS\] (23).
     LeftGtsam,
+    /// The iterated left-invariant filter, with transport of the covariance, and `chi exp(xi)` in a window of one.
+    FilterLeft,
 }
 
 impl Pair {
-    const ALL: [Self; 3] = [Self::LeftRight, Self::GtsamForster, Self::LeftGtsam];
+    const PARAMETRISATIONS: [Self; 3] = [Self::LeftRight, Self::GtsamForster, Self::LeftGtsam];
 
     fn name(self) -> &'static str {
         match self {
             Self::LeftRight => "left, right",
             Self::GtsamForster => "GTSAM, Forster",
             Self::LeftGtsam => "left, GTSAM",
+            Self::FilterLeft => "iterated filter, left",
         }
     }
 
@@ -65,6 +72,10 @@ impl Pair {
             Self::LeftRight => compare_two::<Left, Right>(drive, scheme),
             Self::GtsamForster => compare_two::<Gtsam, Forster>(drive, scheme),
             Self::LeftGtsam => compare_two::<Left, Gtsam>(drive, scheme),
+            Self::FilterLeft => {
+                let newest = smoothed::<Left>(drive, scheme)?;
+                Ok(apart(&filter(drive)?, &newest, drive.fixes.len()))
+            }
         }
     }
 }
@@ -143,9 +154,12 @@ impl Scheme {
     }
 }
 
+/// An estimate of the newest state.
+type Newest = Belief<SE23, Left, 9>;
+
 /// A drive with its IMU preintegrated.
 struct Recording {
-    first: Belief<SE23, Left, 9>,
+    first: Newest,
     motions: Vec<Preintegration<SE23, 9>>,
     fixes: Vec<PositionObservation>,
 }
@@ -162,8 +176,25 @@ impl Recording {
 }
 
 fn compare_two<A: Side, B: Side>(drive: &Recording, scheme: Scheme) -> anyhow::Result<Vec<Apart>> {
-    let (one, other, expected) = match scheme {
-        Scheme::Batch => (batch::<A>(drive)?, batch::<B>(drive)?, PASSES[1]),
+    let expected = match scheme {
+        Scheme::Batch => PASSES[1],
+        Scheme::Window { .. } => drive.fixes.len(),
+    };
+    let (one, other) = (smoothed::<A>(drive, scheme)?, smoothed::<B>(drive, scheme)?);
+    Ok(apart(&one, &other, expected))
+}
+
+/// Estimate by estimate; what is missing of those `expected` is lost.
+fn apart(one: &[Newest], other: &[Newest], expected: usize) -> Vec<Apart> {
+    let pairs = one.iter().zip(other);
+    let mut apart: Vec<Apart> = pairs.map(|(a, b)| Apart::between(a, b)).collect();
+    apart.resize(expected, Apart::LOST);
+    apart
+}
+
+fn smoothed<S: Side>(drive: &Recording, scheme: Scheme) -> anyhow::Result<Vec<Newest>> {
+    match scheme {
+        Scheme::Batch => batch::<S>(drive),
         Scheme::Window {
             capacity,
             prior,
@@ -176,18 +207,32 @@ fn compare_two<A: Side, B: Side>(drive: &Recording, scheme: Scheme) -> anyhow::R
                 jacobians: Jacobians::Exact,
                 ..WindowOptions::new(capacity.unwrap_or(EVERYTHING))
             };
-            let (one, other) = (window::<A>(drive, &options), window::<B>(drive, &options));
-            (one, other, drive.fixes.len())
+            Ok(window::<S>(drive, &options))
         }
+    }
+}
+
+/// The state after each fix.
+fn filter(drive: &Recording) -> anyhow::Result<Vec<Newest>> {
+    let options = UpdateOptions {
+        iterations: PASSES[1],
+        tolerance: 0.0,
+        transport: Transport::Jacobian,
+        gate: Gate::OPEN,
     };
-    let pairs = one.iter().zip(&other);
-    let mut apart: Vec<Apart> = pairs.map(|(a, b)| Apart::between(a, b)).collect();
-    apart.resize(expected, Apart::LOST);
-    Ok(apart)
+    let mut belief = drive.first;
+    let steps = drive.motions.iter().zip(&drive.fixes);
+    steps
+        .map(|(motion, fix)| {
+            belief = motion.carry(&belief);
+            update_with(&mut belief, fix, &WholeSteps, &options)?;
+            Ok(belief)
+        })
+        .collect()
 }
 
 /// The newest state after each fix, until the estimate has diverged so far that it can no longer be computed.
-fn window<S: Side>(drive: &Recording, options: &WindowOptions) -> Vec<Belief<SE23, Left, 9>> {
+fn window<S: Side>(drive: &Recording, options: &WindowOptions) -> Vec<Newest> {
     let mut window = Window::<SE23, S, 9>::new(&drive.first, options);
     let steps = drive.motions.iter().zip(&drive.fixes);
     steps
@@ -200,7 +245,7 @@ fn window<S: Side>(drive: &Recording, options: &WindowOptions) -> Vec<Belief<SE2
 }
 
 /// The newest state after each iteration over the whole drive.
-fn batch<S: Side>(drive: &Recording) -> anyhow::Result<Vec<Belief<SE23, Left, 9>>> {
+fn batch<S: Side>(drive: &Recording) -> anyhow::Result<Vec<Newest>> {
     let fixes = drive.fixes.len();
     let mut chain = Chain::with_capacity(drive.first, fixes + 1, fixes);
     for (motion, fix) in drive.motions.iter().zip(&drive.fixes) {
@@ -263,13 +308,21 @@ impl Row {
 /// Every comparison over `options.runs` runs.
 ///
 /// # Errors
-/// A batch that fails, with its run.
+/// A batch or filter that fails, with its run.
 pub fn compare(options: &Options) -> anyhow::Result<Vec<Row>> {
     let schemes = Scheme::all(options);
-    let all: Vec<(Pair, Scheme)> = Pair::ALL
+    let mut all: Vec<(Pair, Scheme)> = Pair::PARAMETRISATIONS
         .into_iter()
         .flat_map(|pair| schemes.iter().map(move |scheme| (pair, *scheme)))
         .collect();
+    all.extend(options.priors().map(|prior| {
+        let scheme = Scheme::Window {
+            capacity: Some(1),
+            prior,
+            passes: PASSES[1],
+        };
+        (Pair::FilterLeft, scheme)
+    }));
     let bar = progress("smoothers", options.runs);
     let one = |index: u64| -> anyhow::Result<Vec<Vec<Apart>>> {
         let drive = Recording::draw(options.seed, index);
@@ -296,7 +349,7 @@ pub fn compare(options: &Options) -> anyhow::Result<Vec<Row>> {
 /// Runs the experiment; writes two tables and a figure, and returns the first as text.
 ///
 /// # Errors
-/// A batch that fails, with its run; a file that cannot be written.
+/// A batch or filter that fails, with its run; a file that cannot be written.
 pub fn run(options: &Options, out: &Path) -> anyhow::Result<String> {
     let rows = compare(options)?;
     let mut csv = "pair,kind,capacity,prior,iterations,mean_sigmas,median_mean_sigmas,\

@@ -35,7 +35,7 @@ const PASSES: usize = 4;
 ///
 /// The library's own iterated update shortens steps that raise the cost. Where the cost is flat to rounding that is
 /// an accident, which left and right do not share: it would leave them 1e-7 standard deviations apart.
-struct WholeSteps;
+pub(super) struct WholeSteps;
 
 impl<G: LieGroup<D>, const D: usize, const M: usize> GainRule<G, D, M> for WholeSteps {
     fn gain(

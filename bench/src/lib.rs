@@ -1,7 +1,7 @@
 //! Benchmarks of the estimation service, as distributions and as ratios taken in one run, and the papers' experiments.
 //!
 //! [`latency`] measures the whole path between two processes: a sample sent, its estimate read. [`experiment`] repeats
-//! what \[LC\] and \[PAR\] report, with every filter of the library.
+//! what \[LC\], \[IS\] and \[PAR\] report, with every filter and smoother of the library.
 
 pub mod experiment;
 pub mod latency;

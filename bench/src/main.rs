@@ -1,12 +1,13 @@
 //! `inekf-bench`: measures the estimation service, and repeats the papers' experiments.
 
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 use inekf_bench::experiment::section7::{MismatchLaw, Setup};
-use inekf_bench::experiment::{self, Experiment};
+use inekf_bench::experiment::{self, Experiment, Prior};
 use inekf_bench::latency::{LatencyOptions, echo, measure, report};
 use inekf_shared::topic::Instance;
 
@@ -40,18 +41,24 @@ enum Command {
         /// Folder for the results; made if need be.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
-        /// Monte Carlo runs.
-        #[arg(long, default_value_t = 50)]
-        runs: u64,
+        /// Monte Carlo runs [default: 100 for alignment, 20 for marginalisation, else 50].
+        #[arg(long)]
+        runs: Option<u64>,
         /// Seed of all draws.
         #[arg(long, default_value_t = 0)]
         seed: u64,
         /// How the models are wrong (lc-inekf).
         #[arg(long, value_enum, default_value_t = MismatchLaw::Constant, value_name = "MODE")]
         mismatch: MismatchLaw,
-        /// Length of a step in the plane, s.
+        /// Length of a step in the plane, s (lc-inekf, parametrisation).
         #[arg(long, default_value_t = 0.1, value_name = "SECONDS")]
         dt: f64,
+        /// Leave out the adaptive bank, which costs as much as all other filters together (lc-inekf).
+        #[arg(long)]
+        without_adaptive: bool,
+        /// Only this form of the prior that marginalisation leaves, instead of all (alignment, marginalisation).
+        #[arg(long, value_enum, value_name = "FORM")]
+        prior: Option<Prior>,
     },
     /// The partner process of the plain echo.
     #[command(hide = true)]
@@ -83,14 +90,24 @@ fn run(command: Command) -> anyhow::Result<()> {
             seed,
             mismatch,
             dt,
+            without_adaptive,
+            prior,
         } => {
             let setup = Setup {
                 law: mismatch,
                 dt_s: dt,
             };
-            let options = experiment::Options { runs, seed, setup };
-            print!("{}", experiment::run(name, &options, &out)?);
-            println!("\nwritten to {}", out.display());
+            let options = experiment::Options {
+                runs: runs.unwrap_or(name.usual_runs()),
+                seed,
+                setup,
+                adaptive: !without_adaptive,
+                prior,
+            };
+            let tables = experiment::run(name, &options, &out)?;
+            let mut stdout = std::io::stdout().lock();
+            stdout.write_all(tables.as_bytes())?;
+            writeln!(stdout, "\nwritten to {}", out.display())?;
             Ok(())
         }
         Command::Latency {

@@ -1,4 +1,4 @@
-//! Figures 1 and 2 of \[LC\] as SVG text, in the colours of the project's other figures.
+//! The experiments' figures as SVG text, in the colours of the project's other figures.
 
 use std::fmt::Display;
 
@@ -23,7 +23,7 @@ const LEFT: u32 = 86;
 const RIGHT: u32 = 26;
 /// Space for the name and numbers of the x axis, pixels.
 const BELOW: u32 = 50;
-/// Height of one panel of [`over_time`], pixels.
+/// Height of one panel of [`panels`], pixels.
 const PANEL: u32 = 300;
 /// Heights that the axes of [`from_above`] may have, pixels.
 const HEIGHTS: [f64; 2] = [300.0, 720.0];
@@ -52,10 +52,31 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
-/// One pair of axes.
+/// How a panel's y axis runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Evenly, from zero.
+    FromZero,
+    /// In decades. Points that are not positive are left out.
+    Logarithmic,
+}
+
+/// One of the panels of [`panels`].
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// The name of its y axis.
+    pub name: String,
+    /// How that axis runs.
+    pub scale: Scale,
+    /// What it shows.
+    pub series: Vec<Series>,
+}
+
+/// One pair of axes; `y` is in decades where its scale is logarithmic.
 struct Axes<'a> {
     x: (f64, f64),
     y: (f64, f64),
+    scale: Scale,
     names: [&'a str; 2],
 }
 
@@ -77,6 +98,7 @@ pub fn from_above(title: &str, series: &[Series]) -> anyhow::Result<String> {
     let axes = Axes {
         x: around(x, width),
         y: around(y, height),
+        scale: Scale::FromZero,
         names: ["East (m)", "North (m)"],
     };
     figure(title, height as u32 + BELOW, series, |area| {
@@ -84,29 +106,48 @@ pub fn from_above(title: &str, series: &[Series]) -> anyhow::Result<String> {
     })
 }
 
-/// Panels below each other over time in seconds; each has the name of its y axis and the same series, which share
-/// names and colours.
+/// Panels below each other over `x_name`, with the same series in each, which share names and colours.
 ///
 /// # Errors
 /// What the drawing library says.
-pub fn over_time(title: &str, panels: &[(&str, Vec<Series>)]) -> anyhow::Result<String> {
-    let legend = panels.first().map_or(&[][..], |(_, series)| series);
+pub fn panels(title: &str, x_name: &str, panels: &[Panel]) -> anyhow::Result<String> {
+    let legend = panels.first().map_or(&[][..], |panel| &panel.series);
     let count = u32::try_from(panels.len()).unwrap_or(1);
     figure(title, count * PANEL, legend, |area| {
         let mut rest = area.clone();
-        for (name, series) in panels {
-            let points = || series.iter().flat_map(|series| &series.points);
-            let axes = Axes {
-                x: extent(points().map(|p| p.0)),
-                y: (0.0, 1.05 * extent(points().map(|p| p.1)).1),
-                names: ["Time (s)", name],
-            };
+        for panel in panels {
+            let points = || panel.series.iter().flat_map(|series| &series.points);
+            let (x, y) = (points().map(|p| p.0), points().map(|p| p.1));
             let (part, below) = rest.split_vertically(PANEL);
-            draw_axes(&part, &axes, series)?;
+            let mut axes = Axes {
+                x: extent(x),
+                y: (0.0, 1.05 * extent(y.clone()).1),
+                scale: panel.scale,
+                names: [x_name, &panel.name],
+            };
+            if panel.scale == Scale::FromZero {
+                draw_axes(&part, &axes, &panel.series)?;
+            } else {
+                axes.y = extent(y.filter(|y| *y > 0.0).map(f64::log10));
+                draw_axes(&part, &axes, &in_decades(&panel.series))?;
+            }
             rest = below;
         }
         Ok(())
     })
+}
+
+/// `series` with the logarithms of its positive values.
+fn in_decades(series: &[Series]) -> Vec<Series> {
+    let of_points = |points: &[(f64, f64)]| {
+        let positive = points.iter().filter(|(_, y)| *y > 0.0);
+        positive.map(|(x, y)| (*x, y.log10())).collect()
+    };
+    let one = |series: &Series| Series {
+        points: of_points(&series.points),
+        ..series.clone()
+    };
+    series.iter().map(one).collect()
 }
 
 /// Title, legend, and `body` below them.
@@ -187,7 +228,10 @@ fn draw_axes(area: &Area<'_>, axes: &Axes<'_>, series: &[Series]) -> anyhow::Res
         .x_labels(10)
         .y_labels(7)
         .x_label_formatter(&|value| format!("{value:.x_digits$}"))
-        .y_label_formatter(&|value| format!("{value:.y_digits$}"))
+        .y_label_formatter(&|value| match axes.scale {
+            Scale::FromZero => format!("{value:.y_digits$}"),
+            Scale::Logarithmic => in_full(10_f64.powf(*value)),
+        })
         .x_desc(axes.names[0])
         .y_desc(axes.names[1])
         .draw()
@@ -229,6 +273,17 @@ fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
 /// Decimals that tell about ten labels apart.
 fn decimals((low, high): (f64, f64)) -> usize {
     (1.3 - (high - low).log10()).ceil().clamp(0.0, 9.0) as usize
+}
+
+/// Two digits of a positive number, with an exponent where it is far from one.
+fn in_full(value: f64) -> String {
+    match value {
+        0.0095..0.095 => format!("{value:.3}"),
+        0.095..0.95 => format!("{value:.2}"),
+        0.95..9.5 => format!("{value:.1}"),
+        9.5..10_000.0 => format!("{value:.0}"),
+        _ => format!("{value:.0e}"),
+    }
 }
 
 /// A drawing library's error.

@@ -1,16 +1,18 @@
 //! The filters that are compared on [`section7`](super::section7), each as a plain loop over a run.
 //!
-//! Two position sources are stacked at every step. Only the constrained filters and the augmented ones know what
-//! kinds of mismatch there may be (odometry scale; scale of source 1; rotation of source 0); none knows a value.
+//! Two position sources are stacked at every step; the adaptive bank takes them one after the other. Only the
+//! constrained filters and those with mismatches as states know what kinds of mismatch there may be (odometry scale;
+//! scale of source 1; rotation of source 0); none knows a value.
 
 use inekf::filter::{
-    Additive, Belief, Constrained, Covariance, HInfinity, HInfinityGain, Left, Right, Side,
-    UpdateError, UpdateOptions, propagate_augmented, propagate_odometry, update, update_with,
+    Adaptive, Additive, Belief, Consider, Constrained, Covariance, Expected, GainRule, HInfinity,
+    HInfinityGain, Kalman, Left, Right, STANDARD_MODES, Side, UpdateError, UpdateOptions,
+    propagate_augmented, propagate_odometry, standard_modes, update, update_with,
 };
 use inekf::lie::SE2;
 use inekf::model::{
-    Augmented, Declared, OutputMismatch, PlanarPair, PointFix, ProcessColumns, ProcessMismatch,
-    Unknowns,
+    Augmented, Declared, OutputMismatch, PlanarFix, PlanarPair, PointFix, ProcessColumns,
+    ProcessMismatch, Unknowns,
 };
 use nalgebra::{SMatrix, SVector, Vector3};
 
@@ -24,14 +26,18 @@ const OUTPUTS: [OutputMismatch; 2] = [
         axis_w: None,
     },
 ];
-/// Standard deviations of the augmented filter's mismatches at the start, in that order.
+/// Standard deviations of the mismatches for the filters that are told any, in that order.
 const SIGMAS_MISMATCH: [f64; 3] = [0.08, 0.06, 0.03];
+/// The same in a burst, for the adaptive bank.
+const SIGMAS_BURST: [f64; 3] = [0.25, 0.06, 0.03];
 /// \[LC\] VII.
 const GAMMA: f64 = 0.02;
 /// The H-infinity filter takes bounds: three times the standard deviations, nine times the covariances.
 const BOUND: f64 = 9.0;
 /// The random walk of the augmented filter is given for a step of this length, s.
 const WALK_STEP_S: f64 = 0.1;
+/// How long a mismatch that is drawn anew each time lasts, for the adaptive bank, s.
+const WHITE_INTERVAL_S: f64 = 0.1;
 
 /// One of the filters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,11 +61,17 @@ pub enum Filter {
         /// Standard deviation of each mismatch's random walk over 0.1 s.
         walk: f64,
     },
+    /// Linearly constrained left-invariant filter, constraints as soft as the mismatches are small.
+    Soft,
+    /// Left-invariant with the three mismatches considered, not estimated: Schmidt's filter.
+    Considered,
+    /// The bank of augmented filters for mismatches of unknown behaviour.
+    Adaptive,
 }
 
 impl Filter {
-    /// All filters, in the order of the tables.
-    pub const ALL: [Self; 9] = [
+    /// All filters, in the order of the tables: the paper's and their baselines, then what is beyond it.
+    pub const ALL: [Self; 12] = [
         Self::InekfLeft,
         Self::InekfRight,
         Self::InekfIterated,
@@ -69,6 +81,9 @@ impl Filter {
         Self::LcInekf,
         Self::Augmented { walk: 0.0 },
         Self::Augmented { walk: 0.03 },
+        Self::Soft,
+        Self::Considered,
+        Self::Adaptive,
     ];
 
     /// Its name in tables and legends.
@@ -82,6 +97,9 @@ impl Filter {
             Self::LcInekf => "LC-InEKF".to_owned(),
             Self::LcEkf => "LC-EKF".to_owned(),
             Self::Augmented { walk } => format!("augmented, walk {walk}"),
+            Self::Soft => "soft constraints".to_owned(),
+            Self::Considered => "considered".to_owned(),
+            Self::Adaptive => "adaptive".to_owned(),
         }
     }
 
@@ -103,9 +121,12 @@ impl Filter {
             Self::InekfIterated => kalman::<Left>(run, &UpdateOptions::ITERATED),
             Self::Ekf => kalman::<Additive>(run, &UpdateOptions::PLAIN),
             Self::HInfinity => h_infinity(run),
-            Self::LcInekf => constrained::<Left>(run),
-            Self::LcEkf => constrained::<Additive>(run),
-            Self::Augmented { walk } => augmented(run, *walk),
+            Self::LcInekf => constrained::<Left>(run, [f64::INFINITY; 3]),
+            Self::LcEkf => constrained::<Additive>(run, [f64::INFINITY; 3]),
+            Self::Augmented { walk } => augmented(run, *walk, &Kalman),
+            Self::Soft => constrained::<Left>(run, SIGMAS_MISMATCH),
+            Self::Considered => augmented(run, 0.0, &Consider { first: 3 }),
+            Self::Adaptive => adaptive(run),
         }
     }
 }
@@ -151,11 +172,12 @@ fn h_infinity(run: &Run) -> Result<Vec<SE2>, UpdateError> {
     })
 }
 
-fn constrained<S: Side>(run: &Run) -> Result<Vec<SE2>, UpdateError> {
+/// Constraints with mismatches of these standard deviations; infinity is the hard constraint.
+fn constrained<S: Side>(run: &Run, sigmas: [f64; 3]) -> Result<Vec<SE2>, UpdateError> {
     let q = run.odometry_noise();
-    let outputs = OUTPUTS.map(Declared::hard);
-    let mut way =
-        ProcessColumns::new(&PROCESS.map(Declared::hard)).ok_or(UpdateError::TooManyConstraints)?;
+    let process = PROCESS.map(|mismatch| Declared::soft(mismatch, sigmas[0]));
+    let outputs = [0, 1].map(|i| Declared::soft(OUTPUTS[i], sigmas[i + 1]));
+    let mut way = ProcessColumns::new(&process).ok_or(UpdateError::TooManyConstraints)?;
     let mut belief = start::<S>(run);
     over(run, |k| {
         belief = propagate_odometry(&belief, &run.steps[k], &q);
@@ -167,9 +189,17 @@ fn constrained<S: Side>(run: &Run) -> Result<Vec<SE2>, UpdateError> {
     })
 }
 
-fn augmented(run: &Run, walk: f64) -> Result<Vec<SE2>, UpdateError> {
-    let unknowns =
-        Unknowns::new::<2, 3>(&PROCESS, &OUTPUTS).ok_or(UpdateError::TooManyConstraints)?;
+fn unknowns() -> Result<Unknowns, UpdateError> {
+    Unknowns::new::<2, 3>(&PROCESS, &OUTPUTS).ok_or(UpdateError::TooManyConstraints)
+}
+
+/// Mismatches as states, which `rule` corrects or not.
+fn augmented(
+    run: &Run,
+    walk: f64,
+    rule: &impl GainRule<Augmented<SE2, 3, 3, 6>, 6, 4>,
+) -> Result<Vec<SE2>, UpdateError> {
+    let unknowns = unknowns()?;
     let of_pose = start_variances();
     let variances = SVector::<f64, 6>::from_fn(|i, _| match i {
         0..3 => of_pose[i],
@@ -184,7 +214,23 @@ fn augmented(run: &Run, walk: f64) -> Result<Vec<SE2>, UpdateError> {
     over(run, |k| {
         belief = propagate_augmented(&belief, &unknowns, &run.steps[k], &q);
         let seen = unknowns.observe(run.pairs[k]);
-        update(&mut belief, &seen, &UpdateOptions::PLAIN)?;
+        update_with(&mut belief, &seen, rule, &UpdateOptions::PLAIN)?;
         Ok(belief.mean.pose)
+    })
+}
+
+fn adaptive(run: &Run) -> Result<Vec<SE2>, UpdateError> {
+    let unknowns = unknowns()?;
+    let expected = Expected::of(&unknowns, &SIGMAS_MISMATCH.into(), &SIGMAS_BURST.into());
+    let (modes, switching) = standard_modes::<3>(&expected, WHITE_INTERVAL_S);
+    let mut bank: Adaptive<SE2, 3, 3, 6, STANDARD_MODES> =
+        Adaptive::new(&start(run), modes, switching, UpdateOptions::PLAIN);
+    let q = run.odometry_noise();
+    over(run, |k| {
+        bank.advance(&unknowns, &run.steps[k], &q);
+        for (source, fix) in run.pairs[k].fixes.into_iter().enumerate() {
+            bank.update(&unknowns.observe_from(source, PlanarFix::new([fix])))?;
+        }
+        Ok(bank.estimate().mean.pose)
     })
 }

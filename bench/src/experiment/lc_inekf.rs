@@ -3,7 +3,8 @@
 //! `rmse.csv` has the RMSE over the runs at the end of each step; `summary.csv` the RMSE over the second half of the
 //! runs, where the start is forgotten, and over all of them. With e_i the mean square error of run i, the RMSE is
 //! `sqrt(mean e)`; its standard error is that of the mean of e, carried through the root:
-//! `sd(e) / (2 sqrt(n) RMSE)`. Two filters are compared run by run, since they see the same noise.
+//! `sd(e) / (2 sqrt(n) RMSE)`. Two filters are compared run by run, since they see the same noise. The paper's filters
+//! come first; below them the same unknowns as soft constraints, considered, learned, and with the adaptive bank.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -14,7 +15,7 @@ use inekf_client::plot::palette;
 use plotters::style::{Color, RGBColor};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
-use super::figures::{self, Mark, Series};
+use super::figures::{self, Mark, Panel, Scale, Series};
 use super::filters::Filter;
 use super::section7::Run;
 use super::{Options, progress, write};
@@ -106,8 +107,8 @@ fn square_errors(run: &Run, estimates: &[SE2]) -> Vec<Squares> {
     estimates.iter().zip(&run.truth).map(square).collect()
 }
 
-/// All filters on one run.
-fn one_run(options: &Options, index: u64) -> anyhow::Result<Vec<Vec<Squares>>> {
+/// The `filters` on one run.
+fn one_run(options: &Options, filters: &[Filter], index: u64) -> anyhow::Result<Vec<Vec<Squares>>> {
     let run = Run::draw(&options.setup, options.seed, index);
     let errors = |filter: &Filter| {
         let estimates = filter
@@ -115,23 +116,30 @@ fn one_run(options: &Options, index: u64) -> anyhow::Result<Vec<Vec<Squares>>> {
             .with_context(|| format!("{} in run {index}", filter.name()))?;
         Ok(square_errors(&run, &estimates))
     };
-    Filter::ALL.iter().map(errors).collect()
+    filters.iter().map(errors).collect()
 }
 
-/// Runs the experiment; writes two tables and two figures, and returns the summary as text.
+/// Runs the experiment; writes two tables and three figures, and returns the summary as text.
 ///
 /// # Errors
 /// A filter that fails, with its name and run; a file that cannot be written.
 pub fn run(options: &Options, out: &Path) -> anyhow::Result<String> {
     let steps = options.setup.steps();
-    let mut all = Filter::ALL.map(|filter| Errors::of(filter, steps));
+    let filters: Vec<Filter> = Filter::ALL
+        .into_iter()
+        .filter(|filter| options.adaptive || *filter != Filter::Adaptive)
+        .collect();
+    let mut all: Vec<Errors> = filters
+        .iter()
+        .map(|filter| Errors::of(*filter, steps))
+        .collect();
     let bar = progress("filters", options.runs);
     for first in (0..options.runs).step_by(CHUNK as usize) {
         let indices = first..options.runs.min(first + CHUNK);
         // In the order of the runs, so that sums round alike on any number of processors.
         let chunk: Vec<_> = indices
             .into_par_iter()
-            .map(|index| one_run(options, index).inspect(|_| bar.inc(1)))
+            .map(|index| one_run(options, &filters, index).inspect(|_| bar.inc(1)))
             .collect::<anyhow::Result<_>>()?;
         for run in chunk {
             for (errors, squares) in all.iter_mut().zip(&run) {
@@ -145,6 +153,7 @@ pub fn run(options: &Options, out: &Path) -> anyhow::Result<String> {
     write(out, "summary.csv", &summary_csv(&all))?;
     write(out, "figure1.svg", &figure_1(options)?)?;
     write(out, "figure2.svg", &figure_2(options, &all)?)?;
+    write(out, "figure3.svg", &figure_3(options, &all)?)?;
     Ok(table(options, &all))
 }
 
@@ -196,7 +205,9 @@ fn summary_csv(all: &[Errors]) -> String {
 }
 
 fn table(options: &Options, all: &[Errors]) -> String {
-    let Options { runs, seed, setup } = options;
+    let Options {
+        runs, seed, setup, ..
+    } = options;
     let mut text = format!(
         "[LC] section VII: {runs} runs of seed {seed}, steps of {} s, mismatch {:?}\n\
          RMSE and its standard error over the runs\n\n\
@@ -301,7 +312,29 @@ fn figure_2(options: &Options, all: &[Errors]) -> anyhow::Result<String> {
         (Filter::LcInekf, palette::ESTIMATE, 2),
         (Filter::Augmented { walk: 0.03 }, palette::SERIES[4], 2),
     ];
-    let series = |quantity: usize, unit: f64| -> Vec<Series> {
+    rmse_figure("RMSE", options, all, &shown)
+}
+
+/// RMSE over time of what the paper does not have, beside its own filter.
+fn figure_3(options: &Options, all: &[Errors]) -> anyhow::Result<String> {
+    let shown = [
+        (Filter::LcInekf, palette::ESTIMATE, 2),
+        (Filter::Soft, palette::SERIES[2], 2),
+        (Filter::Considered, palette::SERIES[3], 5),
+        (Filter::Augmented { walk: 0.0 }, palette::SERIES[4], 2),
+        (Filter::Adaptive, palette::FIX, 2),
+    ];
+    rmse_figure("Beyond the paper: RMSE", options, all, &shown)
+}
+
+/// RMSE in heading and position over time of the filters in `shown`, each with its colour and width, that were run.
+fn rmse_figure(
+    title: &str,
+    options: &Options,
+    all: &[Errors],
+    shown: &[(Filter, RGBColor, u32)],
+) -> anyhow::Result<String> {
+    let panel = |name: &str, quantity: usize, unit: f64| {
         let one = |(filter, colour, width): &(Filter, RGBColor, u32)| {
             let errors = all.iter().find(|errors| errors.filter == *filter)?;
             let rmse = errors.rmse(quantity).enumerate();
@@ -314,11 +347,16 @@ fn figure_2(options: &Options, all: &[Errors]) -> anyhow::Result<String> {
                     .collect(),
             })
         };
-        shown.iter().filter_map(one).collect()
+        Panel {
+            name: name.to_owned(),
+            scale: Scale::FromZero,
+            series: shown.iter().filter_map(one).collect(),
+        }
     };
     let panels = [
-        ("Heading RMSE (deg)", series(1, 1_f64.to_degrees())),
-        ("Position RMSE (m)", series(0, 1.0)),
+        panel("Heading RMSE (deg)", 1, 1_f64.to_degrees()),
+        panel("Position RMSE (m)", 0, 1.0),
     ];
-    figures::over_time(&format!("RMSE over {} runs", options.runs), &panels)
+    let title = format!("{title} over {} runs", options.runs);
+    figures::panels(&title, "Time (s)", &panels)
 }

@@ -5,27 +5,27 @@
 //!   agree; the covariances do not, and from the next update on neither do the means.
 //! * Corollary 1: nor does iterating the update help; what it needs is the same transport.
 //!
-//! How far apart: of the means, the largest component of the left-invariant difference; of the covariances, both
-//! in left coordinates, the largest entry of the difference. Both in standard deviations of the left filter, and
-//! the largest over steps and runs. Groups: SE(2) with odometry and two position sources ([`section7`](super::section7)
-//! without mismatch), SE_2(3) with an IMU and position fixes on a lever arm.
+//! How far apart ([`apart`](super::apart)): in standard deviations of the left filter, the largest over steps and
+//! runs. Groups: SE(2) with odometry and two position sources ([`section7`](super::section7) without mismatch), SE_2(3)
+//! with an IMU and position fixes on a lever arm ([`imu_drive`](super::imu_drive)).
 
 use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::Context;
 use inekf::filter::{
-    Belief, Covariance, GainRule, Gate, InertialSide, Kalman, Left, Linearised, Right, Side,
-    Transport, UpdateError, UpdateOptions, propagate, propagate_odometry, update_with,
+    Belief, Covariance, GainRule, Gate, InertialSide, Kalman, Left, Linearised, Transport,
+    UpdateError, UpdateOptions, propagate, propagate_odometry, update_with,
 };
-use inekf::lie::{LieGroup, SE2, SE23, SO3};
-use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState, PositionObservation};
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-use rand_chacha::ChaCha8Rng;
+use inekf::lie::{LieGroup, SE2, SE23};
+use inekf::model::Discretisation;
+use nalgebra::SMatrix;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
+use super::apart::Apart;
 use super::filters::start;
-use super::section7::{MismatchLaw, Run, Setup, normal, stream};
+use super::imu_drive::{GRAVITY_W, IMU_DT_S, ImuDrive, NOISE};
+use super::section7::{MismatchLaw, Run, Setup, stream};
 use super::{Options, progress, write};
 
 /// Passes of the iterated update: a fixed number, since the criterion to stop depends on coordinates.
@@ -35,7 +35,7 @@ const PASSES: usize = 4;
 ///
 /// The library's own iterated update shortens steps that raise the cost. Where the cost is flat to rounding that is
 /// an accident, which left and right do not share: it would leave them 1e-7 standard deviations apart.
-struct WholeSteps;
+pub(super) struct WholeSteps;
 
 impl<G: LieGroup<D>, const D: usize, const M: usize> GainRule<G, D, M> for WholeSteps {
     fn gain(
@@ -56,15 +56,6 @@ pub enum Stage {
     FirstUpdate,
     /// After every update of the run.
     AllUpdates,
-}
-
-/// How far apart two filters are, in standard deviations.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Apart {
-    /// The means.
-    pub mean: f64,
-    /// The covariances, relative to the product of two standard deviations.
-    pub covariance: f64,
 }
 
 /// One line of the result.
@@ -113,45 +104,6 @@ trait Drive<G: LieGroup<D>, const D: usize> {
     ) -> Result<(), UpdateError>;
 }
 
-impl Apart {
-    fn between<G: LieGroup<D>, const D: usize>(
-        left: &Belief<G, Left, D>,
-        right: &Belief<G, Right, D>,
-    ) -> Self {
-        let right = right.to_left();
-        let scale = left
-            .covariance
-            .matrix()
-            .diagonal()
-            .map(|variance| 1.0 / variance.sqrt());
-        let mean = Left::difference(&left.mean, &right.mean).component_mul(&scale);
-        let covariance = left.covariance.matrix() - right.covariance.matrix();
-        let covariance = covariance.component_mul(&(scale * scale.transpose()));
-        Self {
-            mean: largest(mean.iter()),
-            covariance: largest(covariance.iter()),
-        }
-    }
-
-    fn or_larger(self, other: Self) -> Self {
-        Self {
-            mean: largest([self.mean, other.mean].iter()),
-            covariance: largest([self.covariance, other.covariance].iter()),
-        }
-    }
-}
-
-/// The largest magnitude; what is not a number counts as larger than any.
-fn largest<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
-    values.fold(0.0, |most, value| {
-        if value.abs() <= most || most.is_nan() {
-            most
-        } else {
-            value.abs()
-        }
-    })
-}
-
 /// Both filters over `drive`.
 fn side_by_side<G: LieGroup<D>, const D: usize>(
     drive: &impl Drive<G, D>,
@@ -181,7 +133,7 @@ fn side_by_side<G: LieGroup<D>, const D: usize>(
             drive.correct(k, &mut left, &options)?;
             drive.correct(k, &mut right, &options)?;
         }
-        most = most.or_larger(Apart::between(&left, &right));
+        most = most.or_larger(Apart::between(&left, &right.to_left()));
     }
     Ok(most)
 }
@@ -209,91 +161,18 @@ impl Drive<SE2, 3> for Run {
     }
 }
 
-/// World frame ENU, m/s^2.
-const GRAVITY_W: Vector3<f64> = Vector3::new(0.0, 0.0, -9.80665);
-/// Length of an IMU sample, s.
-const IMU_DT_S: f64 = 0.01;
-/// IMU samples between two fixes, and fixes.
-const SAMPLES: usize = 100;
-const FIXES: usize = 30;
-/// Standard deviation of a fix on each axis, m.
-const SIGMA_FIX_M: f64 = 0.5;
-/// Of the start: rad, m/s, m, on each axis.
-const SIGMAS_START: [f64; 3] = [0.2, 1.0, 3.0];
-const LEVER_ARM_B: Vector3<f64> = Vector3::new(0.4, -0.2, 1.1);
-/// A MEMS IMU whose biases are known.
-const NOISE: ImuNoise = ImuNoise {
-    gyro_psd: 4e-6,
-    accel_psd: 1e-4,
-    gyro_bias_psd: 0.0,
-    accel_bias_psd: 0.0,
-};
-
-/// A vehicle in space that turns and climbs, with an IMU and position fixes.
-struct ImuDrive {
-    start: SE23,
-    samples: Vec<ImuInput>,
-    fixes: Vec<PositionObservation>,
-}
-
-impl ImuDrive {
-    fn draw(rng: &mut ChaCha8Rng) -> Self {
-        let mut chi = SE23 {
-            rotation: SO3::exp(&Vector3::new(0.0, 0.0, 0.7)),
-            velocity: Vector3::new(6.0, 5.0, 0.0),
-            position: Vector3::new(40.0, -25.0, 3.0),
-        };
-        let off = start_sigmas().component_mul(&normal::<9, 1>(rng));
-        let start = Left::retract(&chi, &off);
-        let (mut samples, mut fixes) = (Vec::new(), Vec::new());
-        for k in 0..SAMPLES * FIXES {
-            let t_s = k as f64 * IMU_DT_S;
-            let actual = ImuInput {
-                omega_b: Vector3::new(0.2 * (1.3 * t_s).sin(), 0.1 * (0.9 * t_s).cos(), 0.3),
-                force_b: Vector3::new(0.5 * (0.7 * t_s).cos(), 1.5, 0.3 * (1.1 * t_s).sin())
-                    - chi.rotation.inverse_rotate(&GRAVITY_W),
-            };
-            let zoh = Discretisation::ZeroOrderHold;
-            let step = chi.imu_step(&actual, &GRAVITY_W, IMU_DT_S, zoh);
-            chi = chi.advance(&step, &NOISE).0;
-            let [gyro, accel] = [NOISE.gyro_psd, NOISE.accel_psd].map(|p| (p / IMU_DT_S).sqrt());
-            samples.push(ImuInput {
-                omega_b: actual.omega_b + gyro * normal::<3, 1>(rng),
-                force_b: actual.force_b + accel * normal::<3, 1>(rng),
-            });
-            if (k + 1) % SAMPLES == 0 {
-                let antenna_w = chi.position + chi.rotation.rotate(&LEVER_ARM_B);
-                fixes.push(PositionObservation {
-                    position_w: antenna_w + SIGMA_FIX_M * normal::<3, 1>(rng),
-                    covariance_w: Matrix3::identity() * (SIGMA_FIX_M * SIGMA_FIX_M),
-                    lever_arm_b: LEVER_ARM_B,
-                });
-            }
-        }
-        Self {
-            start,
-            samples,
-            fixes,
-        }
-    }
-}
-
-fn start_sigmas() -> SVector<f64, 9> {
-    SVector::from_fn(|i, _| SIGMAS_START[i / 3])
-}
-
 impl Drive<SE23, 9> for ImuDrive {
     fn updates(&self) -> usize {
         self.fixes.len()
     }
 
     fn start<S: InertialSide>(&self) -> Belief<SE23, S, 9> {
-        let variances = start_sigmas().map(|sigma| sigma * sigma);
-        Belief::from_left_covariance(self.start, Covariance::from_variances(&variances))
+        let first = self.first();
+        Belief::from_left_covariance(first.mean, first.covariance)
     }
 
     fn predict<S: InertialSide>(&self, k: usize, belief: &mut Belief<SE23, S, 9>) {
-        for sample in &self.samples[k * SAMPLES..(k + 1) * SAMPLES] {
+        for sample in self.samples(k) {
             let zoh = Discretisation::ZeroOrderHold;
             *belief = propagate(belief, sample, &GRAVITY_W, IMU_DT_S, zoh, &NOISE);
         }

@@ -68,6 +68,12 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// The paper's mismatches, and steps of 0.1 s.
+    pub const PAPER: Self = Self {
+        law: MismatchLaw::Constant,
+        dt_s: 0.1,
+    };
+
     /// How many steps a run has.
     pub fn steps(&self) -> usize {
         (DURATION_S / self.dt_s).round() as usize

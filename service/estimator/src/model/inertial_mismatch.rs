@@ -13,7 +13,7 @@
 //! and their noise with them: with one source of 2 cm at the body's origin, five times a second, an unknown bias of
 //! the accelerometer leaves the velocity known to some 2 m/s, and one of the gyroscope the attitude not at all. Two
 //! sources two metres apart see the rotation itself and keep it to 0.01 to 0.03 rad, and less frequent fixes help the
-//! velocity (0.2 m/s at 1 Hz). Where m is small or lasts, [`soft`](super::Declared::soft) or a state serves better.
+//! velocity (0.2 to 0.4 m/s at 1 Hz). Where m is small or lasts, [`soft`](super::Declared::soft) or a state serves better.
 
 use nalgebra::{SVector, Vector3};
 

@@ -374,7 +374,7 @@ fn constraints_without_a_solution_are_refused() {
 
     // The same at start-up, where nothing has moved yet.
     let way = ProcessColumns::in_general_position::<SE2, 2>(&declared).expect("room");
-    let none = ProcessColumns::new(&[]).expect("room");
+    let none = ProcessColumns::<_, ProcessMismatch>::new(&[]).expect("room");
     let check = Constrained::check::<SE2>;
     assert_eq!(
         check(&way, &all, &single),
@@ -541,7 +541,7 @@ fn in_space_a_rotation_takes_two_of_three() {
             Belief::<SE3, Left, 6>::new(mean, Covariance::from_variances(&SVector::repeat(1.0)));
         let points = Points::<1, 3, 3>::new([fix]);
         let outputs = [turned];
-        let none = ProcessColumns::new(&[]).expect("room");
+        let none = ProcessColumns::<_, ProcessMismatch>::new(&[]).expect("room");
         let rule = Constrained::new(&belief, &none, &outputs, &points);
         let constraints = rule
             .constraints(&linearised(&belief, &points))
@@ -708,7 +708,7 @@ fn a_fix_far_from_the_origin_of_the_wheel_still_counts() {
         scale_error: 0.0,
     }]);
     let outputs = [Declared::hard(TURNED)];
-    let none = ProcessColumns::new(&[]).expect("room");
+    let none = ProcessColumns::<_, ProcessMismatch>::new(&[]).expect("room");
     let rule = Constrained::new(&belief, &none, &outputs, &points);
     let correction =
         update_with(&mut belief, &points, &rule, &UpdateOptions::PLAIN).expect("an update");

@@ -12,8 +12,10 @@ use super::gain::{GainRule, Judgement};
 use super::linearised::Linearised;
 use super::side::{Left, Side};
 use super::update::UpdateError;
-use crate::model::mismatch::MAX_PROCESS_MISMATCHES;
-use crate::model::{Columns, Declared, Observation, OutputMismatch, Points, Pose, ProcessColumns};
+use crate::model::process::MAX_PROCESS_MISMATCHES;
+use crate::model::{
+    Columns, Declared, MeanMismatch, Observation, OutputMismatch, Points, Pose, ProcessColumns,
+};
 
 /// The gain that the declared mismatches do not reach.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +32,7 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
     /// The rule for an update of `belief` with `points`, after the motion of `process`.
     pub fn new<G: Pose<D, N>, S: Side>(
         belief: &Belief<G, S, D>,
-        process: &ProcessColumns<D>,
+        process: &ProcessColumns<D, impl MeanMismatch>,
         outputs: &'a [Declared<OutputMismatch>],
         points: &'a Points<K, N, M>,
     ) -> Self {
@@ -54,13 +56,13 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
 
     /// Whether the declared mismatches can be constrained with the sources of `points` at all, and how many
     /// dimensions of the measurement that takes: tried at a pose in general position. For use at start-up, with
-    /// [`ProcessColumns::in_general_position`]; accidents on the way are refused by the update itself.
+    /// [`ProcessColumns::in_general_motion`]; accidents on the way are refused by the update itself.
     ///
     /// # Errors
     /// [`UpdateError::NoSuchSource`], [`UpdateError::UnsolvableConstraints`] or
     /// [`UpdateError::TooManyConstraints`].
     pub fn check<G: Pose<D, N>>(
-        process: &ProcessColumns<D>,
+        process: &ProcessColumns<D, impl MeanMismatch>,
         outputs: &'a [Declared<OutputMismatch>],
         points: &'a Points<K, N, M>,
     ) -> Result<usize, UpdateError> {

@@ -20,6 +20,10 @@
 //! | learned mismatches | [`Augmented`](crate::model::Augmented) | any | [`Kalman`] |
 //! | mismatches of unknown behaviour | [`Augmented`](crate::model::Augmented), several | [`Left`] | [`Adaptive`] over [`Kalman`] |
 //!
+//! What a constraint protects from is declared: wrong odometry
+//! ([`ProcessMismatch`](crate::model::ProcessMismatch)), a wrong IMU
+//! ([`InertialMismatch`](crate::model::InertialMismatch)) or a wrong source
+//! ([`OutputMismatch`](crate::model::OutputMismatch)).
 //! Iterated and with transport, or plain, is a matter of [`UpdateOptions`] for all of them.
 
 pub mod adaptive;

@@ -21,6 +21,8 @@ use crate::lie::{LieGroup, SE23, SO3};
 /// The motion over one interval; SI units, radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuIncrement {
+    /// Rate and force over the interval, biases removed.
+    pub input: ImuInput,
     /// Length of the interval, s.
     pub dt_s: f64,
     /// Orientation of the body at the end, seen from the start.
@@ -77,6 +79,7 @@ impl ImuIncrement {
             }
         };
         Self {
+            input: *input,
             dt_s,
             turn: SO3::exp(&phi),
             turn_matrix: series.gamma::<0>(),

@@ -1,5 +1,8 @@
 //! The declared ways in which a model may be wrong: the three classes of \[LC\] III, as columns.
 //!
+//! Class 1 is here for odometry, in [`inertial_mismatch`](super::inertial_mismatch) for an IMU, and summed up in
+//! [`process`](super::process).
+//!
 //! A mismatch is one to three unknown parameters m, small and zero in the assumed model. To first order
 //!
 //! ```text
@@ -16,6 +19,7 @@ use nalgebra::{SMatrix, SVector, Vector3};
 use super::observation::points::Points;
 use super::odometry::OdometryStep;
 use super::pose::{Pose, RigidPose};
+use super::process::{MeanMismatch, Motion, Part, PathNoise};
 
 /// Most parameters that one mismatch has.
 pub const MAX_PARAMETERS: usize = 3;
@@ -119,6 +123,48 @@ impl ProcessMismatch {
     }
 }
 
+impl MeanMismatch for ProcessMismatch {
+    fn part(&self) -> Part {
+        match self {
+            Self::OdometryScale => Part::Way,
+            Self::OdometryTurnScale | Self::OdometryRotationBias { .. } => Part::Turn,
+        }
+    }
+
+    fn is_scale(&self) -> bool {
+        !self.can_wait()
+    }
+
+    fn can_wait(&self) -> bool {
+        matches!(self, Self::OdometryRotationBias { .. })
+    }
+}
+
+/// Odometry, with the covariance of its noise (D x D, of the left-invariant error).
+impl<G: RigidPose<D, N>, const D: usize, const N: usize> Motion<D, N> for OdometryStep<G> {
+    type State = G;
+    type Mismatch = ProcessMismatch;
+    type Noise = SMatrix<f64, D, D>;
+
+    fn carry(&self) -> impl Fn(&SVector<f64, D>, &ProcessMismatch) -> SVector<f64, D> {
+        let f = self.left_jacobian();
+        move |column, mismatch| f * column + mismatch.direction(self)
+    }
+
+    fn lengthen(&self, path: &mut PathNoise, q: &SMatrix<f64, D, D>) {
+        let along_one = |first: usize, count: usize| {
+            let variances = (first..first + count).map(|axis| q[(axis, axis)]);
+            variances.sum::<f64>() / count as f64
+        };
+        path.way += along_one(G::POSITION, N);
+        path.turn += along_one(0, G::ROTATION_DIM);
+    }
+
+    fn in_general_position() -> [Self; 2] {
+        [Self::new(&SVector::from_fn(|i, _| 0.2 + 0.3 * i as f64), 1.0); 2]
+    }
+}
+
 /// Classes 2 and 3: what is wrong with one of the position sources of a [`Points`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OutputMismatch {
@@ -211,156 +257,5 @@ pub(super) fn rotation_columns<const N: usize>(
             about(Vector3::y()),
             about(Vector3::z()),
         ]),
-    }
-}
-
-/// Most process mismatches that are followed at a time: two scales, and a bias about each of three axes.
-pub const MAX_PROCESS_MISMATCHES: usize = 5;
-
-/// How many standard deviations of its own noise a travelled way, or a turn, must exceed to tell of a scale.
-const GATE_SIGMAS: f64 = 5.0;
-
-/// A lever below a micrometre, m^2, is rounding.
-const NO_LEVER_M2: f64 = 1e-12;
-
-/// T, summed over the steps since the last update: `d <- Ad_{kappa^-1} d + d_kappa / m`.
-///
-/// The columns are left-invariant, at the end of the last step. A scale's column is withheld while the way (or
-/// the turn) is below five standard deviations of the noise of the steps: standing still, or going straight on,
-/// its direction is noise. A bias turns the body where it stands, which no position tells until the body has moved:
-/// then no gain meets `L H d = d`, and the column waits for an update that sees it
-/// ([`hide_unseen`](Self::hide_unseen)).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProcessColumns<const D: usize> {
-    declared: [Option<Declared<ProcessMismatch>>; MAX_PROCESS_MISMATCHES],
-    columns: [SVector<f64, D>; MAX_PROCESS_MISMATCHES],
-    above_noise: [bool; MAX_PROCESS_MISMATCHES],
-    hidden: [bool; MAX_PROCESS_MISMATCHES],
-    /// Variance of the steps' translation, m^2, and rotation, rad^2, along one axis.
-    way_variance: f64,
-    turn_variance: f64,
-}
-
-impl<const D: usize> ProcessColumns<D> {
-    /// No motion yet. `None` if more than [`MAX_PROCESS_MISMATCHES`] are declared.
-    pub fn new(declared: &[Declared<ProcessMismatch>]) -> Option<Self> {
-        if declared.len() > MAX_PROCESS_MISMATCHES {
-            return None;
-        }
-        Some(Self {
-            declared: core::array::from_fn(|i| declared.get(i).copied()),
-            columns: [SVector::zeros(); MAX_PROCESS_MISMATCHES],
-            above_noise: [true; MAX_PROCESS_MISMATCHES],
-            hidden: [false; MAX_PROCESS_MISMATCHES],
-            way_variance: 0.0,
-            turn_variance: 0.0,
-        })
-    }
-
-    /// Adds one step of odometry with noise covariance `q`, D x D.
-    pub fn advance<G: RigidPose<D, N>, const N: usize>(
-        &mut self,
-        step: &OdometryStep<G>,
-        q: &SMatrix<f64, D, D>,
-    ) {
-        let along_one = |first: usize, count: usize| {
-            let variances = (first..first + count).map(|axis| q[(axis, axis)]);
-            variances.sum::<f64>() / count as f64
-        };
-        self.way_variance += along_one(G::POSITION, N);
-        self.turn_variance += along_one(0, G::ROTATION_DIM);
-        let f = step.left_jacobian();
-        for (i, declared) in self.declared.iter().enumerate() {
-            let Some(Declared { mismatch, .. }) = declared else {
-                continue;
-            };
-            let column = f * self.columns[i] + mismatch.direction(step);
-            let (size, variance) = match mismatch {
-                ProcessMismatch::OdometryScale => (column.norm_squared(), self.way_variance),
-                ProcessMismatch::OdometryTurnScale => {
-                    let turn = column.iter().take(G::ROTATION_DIM);
-                    (turn.map(|angle| angle * angle).sum(), self.turn_variance)
-                }
-                ProcessMismatch::OdometryRotationBias { .. } => (0.0, 0.0),
-            };
-            self.above_noise[i] = size >= GATE_SIGMAS * GATE_SIGMAS * variance;
-            self.columns[i] = column;
-        }
-    }
-
-    /// The columns after two steps with no special direction: for a check at start-up. `None` as in
-    /// [`new`](Self::new).
-    pub fn in_general_position<G: RigidPose<D, N>, const N: usize>(
-        declared: &[Declared<ProcessMismatch>],
-    ) -> Option<Self> {
-        let mut columns = Self::new(declared)?;
-        let step = OdometryStep::<G>::new(&SVector::from_fn(|i, _| 0.2 + 0.3 * i as f64), 1.0);
-        columns.advance(&step, &SMatrix::zeros());
-        columns.advance(&step, &SMatrix::zeros());
-        Some(columns)
-    }
-
-    /// Hides the hard constraints on biases of which an observation with the Jacobian `h` (M x D, left-invariant) sees
-    /// too little: the lever `|H d| / |rotation of d|`, m, is below five standard deviations of the way's noise. They
-    /// are hidden from one update, and what they have gathered outlasts the [`reset`](Self::reset) after it: a gain
-    /// leaves an error as it is that the observation does not see, `(I - L H) d = d`.
-    pub fn hide_unseen<G: RigidPose<D, N>, const N: usize, const M: usize>(
-        &mut self,
-        h: &SMatrix<f64, M, D>,
-    ) {
-        let lever_variance = (GATE_SIGMAS * GATE_SIGMAS * self.way_variance).max(NO_LEVER_M2);
-        for (i, declared) in self.declared.iter().enumerate() {
-            let Some(Declared { mismatch, sigma }) = declared else {
-                continue;
-            };
-            let is_bias = matches!(mismatch, ProcessMismatch::OdometryRotationBias { .. });
-            let column = &self.columns[i];
-            let turn = column.rows(0, G::ROTATION_DIM).norm_squared();
-            let unseen = (h * column).norm_squared() <= lever_variance * turn;
-            self.hidden[i] = is_bias && sigma.is_infinite() && turn > 0.0 && unseen;
-        }
-    }
-
-    /// Forgets the way: after an update. What was hidden from it goes on.
-    pub fn reset(&mut self) {
-        for (column, hidden) in self.columns.iter_mut().zip(&self.hidden) {
-            if !hidden {
-                *column = SVector::zeros();
-            }
-        }
-        self.hidden = [false; MAX_PROCESS_MISMATCHES];
-        self.above_noise = [true; MAX_PROCESS_MISMATCHES];
-        self.way_variance = 0.0;
-        self.turn_variance = 0.0;
-    }
-
-    /// Lets `remainder`, D x D of the left-invariant error, act on the columns: what an update without constraints
-    /// leaves of them, `I - K H`.
-    pub fn transform(&mut self, remainder: &SMatrix<f64, D, D>) {
-        for column in &mut self.columns {
-            *column = remainder * *column;
-        }
-    }
-
-    fn is_active(&self, index: usize) -> bool {
-        self.above_noise[index] && !self.hidden[index]
-    }
-
-    /// Bit i is set where the column of mismatch i stands above its noise and is not hidden.
-    pub fn active_bits(&self) -> u32 {
-        let declared = self.declared.iter().enumerate();
-        declared
-            .filter(|(i, declared)| declared.is_some() && self.is_active(*i))
-            .fold(0, |bits, (i, _)| bits | 1 << i)
-    }
-
-    /// The columns that stand above their noise and are not hidden, each with what was declared.
-    pub fn active(
-        &self,
-    ) -> impl Iterator<Item = (Declared<ProcessMismatch>, SVector<f64, D>)> + '_ {
-        let columns = self.declared.iter().zip(&self.columns).enumerate();
-        columns
-            .filter(|(i, _)| self.is_active(*i))
-            .filter_map(|(_, (declared, column))| declared.map(|declared| (declared, *column)))
     }
 }

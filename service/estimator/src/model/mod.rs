@@ -3,19 +3,22 @@
 //! [`group_affine`] is the abstract step of \[IS\] (6); [`imu`] makes one from an IMU sample, [`odometry`] one from
 //! an increment; [`inertial`] is the interface of states that an IMU drives, with [`nav_state`] the one that
 //! carries biases, and [`pose`] that of all states that have a place in the plane or in space; [`observation`]
-//! holds the sensors. [`mismatch`] says how the models may be wrong, as the columns of \[LC\]; [`augmented`] and
-//! [`unknowns`] carry the same mismatches as states.
+//! holds the sensors. [`mismatch`] and [`inertial_mismatch`] say how the models may be wrong, as the columns of
+//! \[LC\], [`process`] sums those of the motion; [`augmented`] and [`unknowns`] carry the same mismatches of
+//! odometry as states.
 
 pub mod augmented;
 pub mod group_affine;
 pub mod imu;
 pub mod increment;
 pub mod inertial;
+pub mod inertial_mismatch;
 pub mod mismatch;
 pub mod nav_state;
 pub mod observation;
 pub mod odometry;
 pub mod pose;
+pub mod process;
 pub mod transition;
 pub mod unknowns;
 
@@ -24,11 +27,13 @@ pub use group_affine::{Automorphism, FreeMotion, GroupAffineStep};
 pub use imu::{Discretisation, ImuInput, ImuNoise, ImuStep};
 pub use increment::ImuIncrement;
 pub use inertial::InertialState;
-pub use mismatch::{Columns, Declared, OutputMismatch, ProcessColumns, ProcessMismatch};
+pub use inertial_mismatch::{InertialMismatch, InertialScale};
+pub use mismatch::{Columns, Declared, OutputMismatch, ProcessMismatch};
 pub use nav_state::NavState;
 pub use observation::points::{PlanarFix, PlanarPair, PointFix, Points, SpatialFix, SpatialPair};
 pub use observation::{HeadingObservation, Observation, PositionObservation, VelocityObservation};
 pub use odometry::OdometryStep;
 pub use pose::{Pose, RigidPose};
+pub use process::{MeanMismatch, Motion, Part, PathNoise, ProcessColumns};
 pub use transition::Transition;
 pub use unknowns::{AugmentedPoints, AugmentedStep, Unknowns};

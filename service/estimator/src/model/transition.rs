@@ -16,9 +16,9 @@
 //! as large as a bias of covariance `psd / dt`, joins T in between.
 //! [`propagate_dense`](crate::filter::propagate_dense) is the reference.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::imu::ImuNoise;
+use super::imu::{ImuInput, ImuNoise};
 use crate::columns::{Column, combined};
 
 /// F and the shape of Q of one interval, in the error of one side.
@@ -52,6 +52,37 @@ fn times(e: &Matrix3<f64>, a: f64, b: f64, c: f64) -> [f64; 3] {
 }
 
 impl Transition {
+    /// Where the error `xi` is after the interval, if the input was off by `disturbance` (rad/s, m/s^2): `F xi + B d`
+    /// on the pose, as a bias of minus that size would move it; biases stay. D = 9 or 15.
+    pub fn moved<const D: usize>(
+        &self,
+        xi: &SVector<f64, D>,
+        disturbance: &ImuInput,
+    ) -> SVector<f64, D> {
+        const { assert!(D == POSE || D == POSE + INPUTS) };
+        let part = |first: usize| Vector3::new(xi[first], xi[first + 1], xi[first + 2]);
+        let (mut rate, mut force) = (disturbance.omega_b, disturbance.force_b);
+        if D > POSE {
+            rate -= part(POSE);
+            force -= part(POSE + 3);
+        }
+        let (phi, nu, rho) = (part(0), part(3), part(6));
+        let [c_1, c_2] = &self.couplings;
+        let [n_0, n_1, n_2] = &self.by_rate;
+        let [a_1, a_2] = &self.by_force;
+        let before_turn = [
+            phi + n_0 * rate,
+            nu + c_1.cross(&phi) + n_1 * rate + a_1 * force,
+            rho + c_2.cross(&phi) + nu * self.dt_s + n_2 * rate + a_2 * force,
+        ];
+        let mut moved = *xi;
+        for (first, part) in (0..).step_by(3).zip(before_turn) {
+            let turned = self.turn.map_or(part, |e| e * part);
+            moved.fixed_rows_mut::<3>(first).copy_from(&turned);
+        }
+        moved
+    }
+
     /// Makes P `F P F^T + Q`, exactly symmetric; D = 9 without biases and 15 with them.
     #[inline(always)]
     pub(super) fn carry<const D: usize>(&self, p: &mut SMatrix<f64, D, D>, noise: &ImuNoise) {

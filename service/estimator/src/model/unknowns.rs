@@ -13,13 +13,12 @@
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::augmented::Augmented;
-use super::mismatch::{
-    Declared, MAX_PROCESS_MISMATCHES, OutputMismatch, ProcessMismatch, rotation_columns,
-};
+use super::mismatch::{Declared, OutputMismatch, ProcessMismatch, rotation_columns};
 use super::observation::Observation;
 use super::observation::points::Points;
 use super::odometry::OdometryStep;
 use super::pose::{Pose, RigidPose};
+use super::process::MAX_PROCESS_MISMATCHES;
 use crate::lie::{LieGroup, SO2, SO3};
 
 /// Most output mismatches that a state carries.

@@ -306,7 +306,7 @@ fn another_layout_under_the_same_name_is_a_clear_error() {
     let text = transport::control(&node, &instance())
         .unwrap_err()
         .to_string();
-    for part in ["inekf.ControlResponse.v2", "inekf.Health.v2 (280 bytes"] {
+    for part in ["inekf.ControlResponse.v3", "inekf.Health.v2 (280 bytes"] {
         assert!(text.contains(part), "{text}");
     }
 }

@@ -104,7 +104,10 @@ fn each_fault_at_the_top_of_the_file() {
         (
             "estimator = \"lc-inekf\"",
             "estimator",
-            &["not built for model \"imu\"", "\"inekf\" only"],
+            &[
+                "not built for model \"imu\"",
+                "\"inekf\" and \"smoother\" only",
+            ],
         ),
         (
             "estimator = \"smother\"",

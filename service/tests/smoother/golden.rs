@@ -71,7 +71,7 @@ fn inputs() -> Vec<Input> {
     let mut inputs = Vec::new();
     for (row, k) in samples.iter().zip(0..) {
         let stamp_ns = k * PERIOD_NS;
-        if k > 0 && stamp_ns % SECOND_NS == 0 {
+        if k > 0 && stamp_ns.is_multiple_of(SECOND_NS) {
             let fix = &fixes[k as usize / 200 - 1];
             inputs.push(Input::Position(PositionFix {
                 header: header(stamp_ns, k / 200),

@@ -26,7 +26,7 @@ fn drive(engine: &mut Full, late: u64) -> Vec<inekf_shared::message::EstimateSe2
             let due = k - late;
             // Between samples, at one, and just before one.
             let stamp_ns = stamp(due) - [3_333_333, 0, 1][(due / 50 % 3) as usize];
-            if due % 100 == 0 {
+            if due.is_multiple_of(100) {
                 engine.velocity(&velocity(stamp_ns, due), &mut outbox);
             }
             engine.position(&position(stamp_ns, due, 1), &mut outbox);
@@ -54,7 +54,7 @@ fn a_late_fix_gives_the_bits_that_it_would_have_given_on_time() {
         for k in 0..=300_u64 {
             if k > 0 && k.is_multiple_of(50) && k + late <= 300 {
                 let stamp_ns = stamp(k) - [3_333_333, 0, 1][(k / 50 % 3) as usize];
-                if k % 100 == 0 {
+                if k.is_multiple_of(100) {
                     expected.velocity(&velocity(stamp_ns, k), &mut outbox);
                 }
                 expected.position(&position(stamp_ns, k, 1), &mut outbox);

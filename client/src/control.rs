@@ -1,10 +1,10 @@
-//! Requests to a daemon: reset, set state, snapshot, barrier.
+//! Requests to a daemon: reset, set state, snapshot, barrier, smoothed window.
 
 use std::time::{Duration, Instant};
 
 use inekf_shared::message::{
-    CONTROL_BARRIER, CONTROL_OK, CONTROL_RESET, CONTROL_SET_STATE, CONTROL_SNAPSHOT,
-    ControlRequest, ControlResponse, StateVector, Zero, control_kind_name,
+    CONTROL_BARRIER, CONTROL_OK, CONTROL_RESET, CONTROL_SET_STATE, CONTROL_SMOOTHED,
+    CONTROL_SNAPSHOT, ControlRequest, ControlResponse, StateVector, Zero, control_kind_name,
 };
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, ControlClient, Node, TransportError, WakeNotifier};
@@ -104,6 +104,15 @@ impl Controller {
     /// [`ControlError`].
     pub fn barrier(&mut self) -> Result<ControlResponse, ControlError> {
         self.request(CONTROL_BARRIER, StateVector::ZERO)
+    }
+
+    /// Has the states in the window of the smoother published, for a [`SmoothedReader`](crate::read::SmoothedReader);
+    /// the answer says how many they are, and under which request.
+    ///
+    /// # Errors
+    /// [`ControlError`]; refused if the daemon has no smoother, or no state yet.
+    pub fn smoothed(&mut self) -> Result<ControlResponse, ControlError> {
+        self.request(CONTROL_SMOOTHED, StateVector::ZERO)
     }
 
     fn request(&mut self, kind: u32, state: StateVector) -> Result<ControlResponse, ControlError> {

@@ -29,4 +29,5 @@ pub mod replay;
 pub mod rows;
 pub mod session;
 pub mod simulate;
+pub mod smoothed;
 pub mod table;

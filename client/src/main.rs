@@ -106,6 +106,9 @@ struct ReplayArguments {
     /// The estimate CSV to write.
     #[arg(long, value_name = "FILE.csv")]
     out: PathBuf,
+    /// Write the smoothed states as well, with the columns of the estimate CSV; for a daemon with estimator = "smoother".
+    #[arg(long, value_name = "FILE.csv")]
+    smoothed: Option<PathBuf>,
     /// Write the covariance as well: the upper triangle, row by row.
     #[arg(long)]
     covariance: bool,
@@ -187,6 +190,7 @@ fn run_replay(arguments: ReplayArguments) -> anyhow::Result<()> {
         config: arguments.config,
         speed: arguments.speed,
         out: arguments.out,
+        smoothed: arguments.smoothed,
         covariance: arguments.covariance,
         instance: arguments.instance,
     };
@@ -199,6 +203,13 @@ fn run_replay(arguments: ReplayArguments) -> anyhow::Result<()> {
         summary.rows,
         options.out.display()
     );
+    if let Some(path) = &options.smoothed {
+        println!(
+            "smoothed {} states in {}",
+            summary.smoothed_rows,
+            path.display()
+        );
+    }
     let Counters {
         accepted,
         gated,

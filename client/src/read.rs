@@ -14,15 +14,15 @@
 //! The estimates of the model `imu` are meant where nothing else is said; those of odometry are read as
 //! `EstimateReader::<EstimateSe2>` or `EstimateReader::<EstimateSe3>`. [`model_of`] says which a daemon has.
 
-use inekf_shared::message::{EstimateMessage, EstimateSe23};
+use inekf_shared::message::{EstimateMessage, EstimateSe23, SmoothedState};
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, LatestReader, Node, Subscriber, TransportError};
 
 use crate::model::Model;
 
-/// The estimates could not be received.
+/// Estimates or smoothed states could not be received.
 #[derive(Debug, thiserror::Error)]
-#[error("receiving estimates: {cause}")]
+#[error("receiving from the daemon: {cause}")]
 pub struct ReadError {
     /// iceoryx2's word for it.
     pub cause: String,
@@ -90,6 +90,65 @@ impl<E: EstimateMessage> EstimateReader<E> {
     }
 
     /// Estimates that were overwritten before they were read.
+    pub fn missed(&self) -> u64 {
+        self.missed
+    }
+}
+
+/// Receives the smoothed states of one daemon, in order, and counts those it missed: each state that leaves the
+/// window, and the whole window when a request asks for it.
+pub struct SmoothedReader {
+    states: Subscriber<SmoothedState>,
+    next_index: Option<u64>,
+    missed: u64,
+    _node: Node,
+}
+
+impl SmoothedReader {
+    /// A reader of `instance`; it gets what is published from now on.
+    ///
+    /// # Errors
+    /// [`TransportError`], naming the service and the remedy.
+    pub fn open(instance: &Instance) -> Result<Self, TransportError> {
+        Self::open_on(transport::open_node("inekf-smoothed")?, instance)
+    }
+
+    /// The same on a node of one's own.
+    ///
+    /// # Errors
+    /// [`TransportError`], naming the service and the remedy.
+    pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
+        Ok(Self {
+            states: transport::smoothed(&node, instance)?.subscriber()?,
+            next_index: None,
+            missed: 0,
+            _node: node,
+        })
+    }
+
+    /// The next state, or `None` if none waits. Never blocks.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn next_state(&mut self) -> Result<Option<SmoothedState>, ReadError> {
+        let received = self.states.receive().map_err(|error| ReadError {
+            cause: error.to_string(),
+        })?;
+        Ok(received.map(|state| {
+            if state.request_id == 0 {
+                // A smaller number is a daemon that has started again.
+                if let Some(expected) = self.next_index
+                    && state.index > expected
+                {
+                    self.missed += state.index - expected;
+                }
+                self.next_index = Some(state.index + 1);
+            }
+            *state
+        }))
+    }
+
+    /// States that left the window and were overwritten before they were read.
     pub fn missed(&self) -> u64 {
         self.missed
     }

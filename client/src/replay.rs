@@ -19,6 +19,7 @@ use crate::pace::{Pace, Speed};
 use crate::progress::Progress;
 use crate::rows::{RowBuilder, state, triangle};
 use crate::session::{Session, running_model, why_no_estimate};
+use crate::smoothed::SmoothedOutput;
 use crate::table::EstimateWriter;
 
 /// What to replay, and how.
@@ -32,7 +33,9 @@ pub struct ReplayOptions {
     pub speed: Speed,
     /// The estimate CSV to write.
     pub out: PathBuf,
-    /// Whether it has the covariance.
+    /// The CSV of smoothed states to write, if one is wanted; the daemon must have a smoother.
+    pub smoothed: Option<PathBuf>,
+    /// Whether the estimate CSV has the covariance.
     pub covariance: bool,
     /// The daemon to feed if none is started.
     pub instance: Instance,
@@ -45,6 +48,8 @@ pub struct ReplaySummary {
     pub sent: usize,
     /// Rows written.
     pub rows: usize,
+    /// Rows of smoothed states written.
+    pub smoothed_rows: usize,
     /// How long the feeding took.
     pub took: Duration,
     /// The daemon's counters at the end.
@@ -95,6 +100,10 @@ fn feed<E: Estimate>(
         .events_for(E::KIND)
         .with_context(|| options.dir.display().to_string())?;
     let mut session = Session::<E>::open(instance)?;
+    let mut smoothed = match &options.smoothed {
+        Some(path) => Some(SmoothedOutput::new(instance, path)?),
+        None => None,
+    };
     session.set_initial(&dataset.meta)?;
     let mut output = Output::new(&options.out, options.covariance)?;
     let progress = Progress::new("replaying", events.len());
@@ -119,11 +128,18 @@ fn feed<E: Estimate>(
                 session.take_estimates(&mut |estimate| output.take(&estimate))?;
             }
         }
+        if let Some(smoothed) = &mut smoothed {
+            smoothed.take_left()?;
+        }
         sent += 1;
         progress.advance(sent);
     }
     let last = session.settle(&mut |estimate| output.take(&estimate))?;
     let took = started.elapsed();
+    let smoothed_rows = match smoothed {
+        Some(smoothed) => smoothed.finish(session.controller())?,
+        None => 0,
+    };
     progress.finish();
     let rows = output.finish()?;
     if rows == 0 {
@@ -132,6 +148,7 @@ fn feed<E: Estimate>(
     Ok(ReplaySummary {
         sent,
         rows,
+        smoothed_rows,
         took,
         last,
     })

@@ -158,6 +158,11 @@ impl<E: Estimate> Session<E> {
         Ok(())
     }
 
+    /// The requests, for what a session does not ask itself.
+    pub fn controller(&mut self) -> &mut Controller {
+        &mut self.controller
+    }
+
     /// The daemon's state and covariance now.
     ///
     /// # Errors

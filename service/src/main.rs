@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand};
 use inekf::filter::UpdateError;
 use inekf_service::config::Config;
 use inekf_service::daemon::{self, Ports};
-use inekf_service::engine::{self, Engine, Model, Use};
+use inekf_service::engine::{self, Engine, History, Model, Use};
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, inspect};
 
@@ -145,7 +145,7 @@ struct Serve<'a> {
 impl Use for Serve<'_> {
     type Output = anyhow::Result<()>;
 
-    fn with<M: Model>(self, engine: Engine<M>) -> anyhow::Result<()> {
+    fn with<M: Model, H: History<M>>(self, engine: Engine<M, H>) -> anyhow::Result<()> {
         run(engine, self.config, self.instance, self.stop)
     }
 }
@@ -156,16 +156,16 @@ struct Built;
 impl Use for Built {
     type Output = ();
 
-    fn with<M: Model>(self, _engine: Engine<M>) {}
+    fn with<M: Model, H: History<M>>(self, _engine: Engine<M, H>) {}
 }
 
-fn run<M: Model>(
-    mut engine: Engine<M>,
+fn run<M: Model, H: History<M>>(
+    mut engine: Engine<M, H>,
     config: &Config,
     instance: &Instance,
     stop: &AtomicBool,
 ) -> anyhow::Result<()> {
-    let mut ports = Ports::open(instance, config.runtime.wait)?;
+    let mut ports = Ports::open(instance, config.runtime.wait, config.smoother.is_some())?;
     let mut out = std::io::stdout();
     writeln!(
         out,

@@ -7,8 +7,8 @@ use inekf_service::config::{
     Axis, Config, Discretisation, Estimator, GapPolicy, HeadingSource, Health, Hinf, HinfGain,
     Hold, Imu, IncrementNoise, Inertial, InertialNoise, Initial, Invariance, KeySpec, Late, Level,
     Mismatch, Mismatched, MissingPartner, Model, Motion, Odometry, OdometryNoise, PositionSource,
-    Rows, Runtime, Stacking, Transport, Update, VelocitySource, WaitMode, WhiteNoise, Wrong,
-    schema,
+    Rows, Runtime, Smoother, Stacking, Transport, Update, VelocitySource, WaitMode, WhiteNoise,
+    Wrong, schema,
 };
 
 const MINIMAL: &str = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
@@ -180,7 +180,7 @@ fn switched(file: &str, out: &[&str], on: &[&str]) -> String {
 fn what_the_example_switches_off_can_be_switched_on() {
     let disabled: Vec<String> = example_keys(EXAMPLES[0])
         .into_iter()
-        .filter(|key| !key.enabled)
+        .filter(|key| !key.enabled && key.header != "[smoother]")
         .map(|key| key.name)
         .collect();
     assert!(!disabled.is_empty());
@@ -201,6 +201,26 @@ fn what_the_example_switches_off_can_be_switched_on() {
     assert_eq!(config.initial.level, Level::Given);
     assert_eq!(config.initial.position_m, Some([0.0; 3]));
     assert_eq!(config.update.gate_probability, Some(0.9999));
+
+    let smoother = [
+        "[smoother]",
+        "window = ",
+        "iterations",
+        "prior",
+        "param",
+        "jac",
+    ];
+    // The table of headings, and what the smoother does not use of the update.
+    let filters = ["iterations", "transport", "[[heading_source]]"];
+    let text = switched(EXAMPLES[0], &filters, &smoother)
+        .replace("estimator = \"inekf\"", "estimator = \"smoother\"")
+        .replace(
+            "[[velocity_source]]\nid = 0\nsigma_scale = 1.0\n\nid = 0\nsigma_scale = 1.0\n",
+            "",
+        );
+    let config = Config::from_toml_str(&text, "smoother").unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(config.estimator, Estimator::Smoother);
+    assert_eq!(config.smoother, Some(Smoother::default()));
 }
 
 #[test]
@@ -349,6 +369,7 @@ fn a_minimal_file_takes_the_documented_defaults() {
         mismatched: vec![],
         stacking: None,
         hinf: None,
+        smoother: None,
         late: Late {
             window_s: 1.0,
             capacity: 2048,
@@ -432,6 +453,7 @@ fn a_minimal_file_of_odometry_takes_the_documented_defaults() {
         mismatched: vec![],
         stacking: None,
         hinf: None,
+        smoother: None,
         late: Late::default(),
         health: Health::default(),
         runtime: Runtime::default(),

@@ -52,6 +52,14 @@ pub const ESTIMATE: PubSubQos = PubSubQos {
     history: 0,
 };
 
+/// Smoothed states: a whole window on request, of 1000 states at most, on top of what has left it.
+pub const SMOOTHED: PubSubQos = PubSubQos {
+    buffer: 2048,
+    publishers: 2,
+    subscribers: 8,
+    history: 0,
+};
+
 /// Health: a late subscriber gets the last one at once.
 pub const HEALTH: PubSubQos = PubSubQos {
     buffer: 8,
@@ -67,6 +75,7 @@ pub const fn pub_sub(topic: Topic) -> Option<PubSubQos> {
         Topic::Imu | Topic::Odometry2d | Topic::Odometry3d => Some(PROPAGATION),
         Topic::Position | Topic::Velocity | Topic::Heading => Some(AIDING),
         Topic::Estimate => Some(ESTIMATE),
+        Topic::Smoothed => Some(SMOOTHED),
         Topic::Health => Some(HEALTH),
         Topic::Latest | Topic::Control | Topic::Wake => None,
     }

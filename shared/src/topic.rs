@@ -92,6 +92,8 @@ pub enum Topic {
     Estimate,
     /// The newest estimate only, daemon to all.
     Latest,
+    /// States that have left the window of a smoother, and on request those in it, daemon to all.
+    Smoothed,
     /// Health of the daemon, daemon to all.
     Health,
     /// Requests of clients and the daemon's responses.
@@ -102,7 +104,7 @@ pub enum Topic {
 
 impl Topic {
     /// Every topic.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Imu,
         Self::Odometry2d,
         Self::Odometry3d,
@@ -111,6 +113,7 @@ impl Topic {
         Self::Heading,
         Self::Estimate,
         Self::Latest,
+        Self::Smoothed,
         Self::Health,
         Self::Control,
         Self::Wake,
@@ -128,6 +131,7 @@ impl Topic {
             Self::Heading => "heading",
             Self::Estimate => "estimate",
             Self::Latest => "latest",
+            Self::Smoothed => "smoothed",
             Self::Health => "health",
             Self::Control => "control",
             Self::Wake => "wake",
@@ -197,6 +201,7 @@ mod tests {
                 "inekf/car-1/heading",
                 "inekf/car-1/estimate",
                 "inekf/car-1/latest",
+                "inekf/car-1/smoothed",
                 "inekf/car-1/health",
                 "inekf/car-1/control",
                 "inekf/car-1/wake",

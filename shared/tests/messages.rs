@@ -44,7 +44,8 @@ fn type_names_are_distinct() {
         Health,
         StateVector,
         ControlRequest,
-        ControlResponse
+        ControlResponse,
+        SmoothedState
     );
 }
 

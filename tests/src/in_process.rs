@@ -3,17 +3,20 @@
 //! Order: before each sample the fixes with a stamp up to its own: positions, then velocities, then headings; what is
 //! left at the end and lies ahead of the last sample is not fed.
 
-use inekf::filter::{InertialSide, Left};
+use inekf::filter::Left;
 use inekf::lie::SE23;
-use inekf::model::{InertialState, NavState};
+use inekf::model::NavState;
 use inekf_client::dataset::{Dataset, Initial, Meta};
 use inekf_client::feed::{Input, Numbering};
 use inekf_client::rows::{RowBuilder, state, triangle};
 use inekf_client::table::{EstimateWriter, Layout};
 use inekf_service::config::{Config, Motion};
+use inekf_service::engine::smoothing::SmoothingEngine;
 use inekf_service::engine::tally::Tally;
-use inekf_service::engine::{InertialEngine, Outbox, Settings};
-use inekf_shared::message::{EstimateSe23, MODEL_IMU, NAV_DIM, StateVector, Zero, triangle_index};
+use inekf_service::engine::{Engine, History, InertialEngine, Model, Outbox, Settings};
+use inekf_shared::message::{
+    EstimateSe23, ImuSample, MODEL_IMU, NAV_DIM, StateVector, Zero, triangle_index,
+};
 
 /// Feeds a dataset to an engine with this configuration; every estimate goes to `outbox`.
 pub fn run(dataset: &Dataset, config: &str, outbox: &mut impl Outbox<EstimateSe23>) -> Tally {
@@ -21,10 +24,25 @@ pub fn run(dataset: &Dataset, config: &str, outbox: &mut impl Outbox<EstimateSe2
     let Motion::Inertial(inertial) = &config.motion else {
         panic!("the configuration is not one of the model imu");
     };
-    if inertial.biases {
-        feed::<NavState, Left, 15>(dataset, &config, outbox)
-    } else {
-        feed::<SE23, Left, 9>(dataset, &config, outbox)
+    let settings = Settings::new(&config);
+    match (inertial.biases, &settings.smoother) {
+        (true, None) => {
+            let engine = InertialEngine::<NavState, Left, 15>::new(settings);
+            feed(dataset, engine, outbox)
+        }
+        (false, None) => feed(
+            dataset,
+            InertialEngine::<SE23, Left, 9>::new(settings),
+            outbox,
+        ),
+        (true, Some(smoother)) => {
+            let engine = SmoothingEngine::<NavState, 15>::smoothing(settings, smoother);
+            feed(dataset, engine, outbox)
+        }
+        (false, Some(smoother)) => {
+            let engine = SmoothingEngine::<SE23, 9>::smoothing(settings, smoother);
+            feed(dataset, engine, outbox)
+        }
     }
 }
 
@@ -89,12 +107,15 @@ pub fn initial_state(meta: &Meta) -> Option<StateVector> {
 }
 
 /// Feeds everything that is due.
-fn feed<G: InertialState<D>, S: InertialSide, const D: usize>(
+fn feed<M, H>(
     dataset: &Dataset,
-    config: &Config,
+    mut engine: Engine<M, H>,
     outbox: &mut impl Outbox<EstimateSe23>,
-) -> Tally {
-    let mut engine = InertialEngine::<G, S, D>::new(Settings::new(config));
+) -> Tally
+where
+    M: Model<Sample = ImuSample, Estimate = EstimateSe23>,
+    H: History<M>,
+{
     if let Some(state) = initial_state(&dataset.meta) {
         engine.set_state(&state).expect("the initial state is good");
     }

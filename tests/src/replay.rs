@@ -31,6 +31,20 @@ pub fn replay(folder: &Path, config: &str, more: &[&str]) -> Replayed {
     replayed
 }
 
+/// The same with the smoothed states too: what the replay gave, the bytes of their CSV, and its rows.
+pub fn replay_smoothed(
+    folder: &Path,
+    config: &str,
+    more: &[&str],
+) -> (Replayed, Vec<u8>, Vec<EstimateRow>) {
+    let output = TempDir::new().expect("a folder for the output");
+    let smoothed = output.path().join("smoothed.csv");
+    let path = smoothed.to_str().expect("a path of text");
+    let replayed = replay(folder, config, &[&["--smoothed", path], more].concat());
+    let csv = fs::read(&smoothed).expect("the smoothed CSV");
+    (replayed, csv, estimates(&smoothed))
+}
+
 /// The same in shared memory that is there already.
 pub fn replay_in(memory: &Memory, folder: &Path, config: &str, more: &[&str]) -> Replayed {
     let (_config, config) = config_file(config);

@@ -7,7 +7,7 @@ use inekf_client::dataset::read_truth;
 use inekf_client::evaluate::{DEFAULT_MAX_GAP_NS, Summary, Trajectory, wrap_angle};
 use inekf_tests::folder::{Folder, fixes, heading_of, recording, with_heading};
 use inekf_tests::process::project_config;
-use inekf_tests::replay::{Replayed, replay};
+use inekf_tests::replay::{Replayed, replay, replay_smoothed};
 use inekf_tests::score::{SECOND_NS, against_fixes, against_truth, gyro_bias};
 use nalgebra::Vector3;
 
@@ -34,6 +34,40 @@ fn a_car_with_noisy_fixes_and_a_heading_ten_degrees_wrong_is_within_two_thirds_o
         );
         assert!(rmse.x <= 0.57 && rmse.y <= 0.66);
     }
+}
+
+#[test]
+fn smoothing_over_fifty_seconds_more_than_halves_the_error_and_costs_the_newest_state_nothing() {
+    let Some(recording) = recording("kitti00_car_a") else {
+        return;
+    };
+    let folder = Folder::with_files(&recording, &["imu.csv", "meta.json"]);
+    folder.take(&recording, "position_noisy.csv", "position.csv");
+    let filter = replay(folder.path(), &project_config("kitti00_car_a"), &[]);
+    let config = project_config("kitti00_car_a_smoother");
+    let (smoother, _, states) = replay_smoothed(folder.path(), &config, &[]);
+
+    let [filtered, newest] =
+        [&filter, &smoother].map(|replayed| truth_errors(replayed, &recording, 30));
+    println!(
+        "filter {:.4} m, newest smoothed state {:.4} m",
+        filtered.distance_rmse_m, newest.distance_rmse_m
+    );
+    assert!(newest.distance_rmse_m <= filtered.distance_rmse_m);
+
+    // The states that left the window: all but the last fifty.
+    let left = &states[..states.len() - 50];
+    assert_eq!(states.len(), fixes(folder.path(), "position.csv").len());
+    let truth = read_truth(recording.join("truth.csv")).unwrap_or_else(|error| panic!("{error}"));
+    let smoothed = against_truth(left, &truth, 0);
+    println!(
+        "left the window: RMSE {:.3} m east, {:.3} m north, heading {:.3} deg",
+        smoothed.position_rmse_m.x,
+        smoothed.position_rmse_m.y,
+        smoothed.heading_rmse_rad.to_degrees()
+    );
+    assert!(smoothed.position_rmse_m.x <= 0.20 && smoothed.position_rmse_m.y <= 0.28);
+    assert!(smoothed.heading_rmse_rad.to_degrees() <= 0.4);
 }
 
 #[test]

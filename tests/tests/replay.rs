@@ -1,13 +1,17 @@
 //! `inekf-client replay` with a daemon of its own: it loses nothing, and folder and configuration alone decide every
 //! byte. The oracle is the same engine in this process, fed row by row.
 
+use std::collections::BTreeSet;
+
 use inekf_client::dataset::{Dataset, Event, Initial, PositionRow};
 use inekf_client::simulate::{InitialOptions, PositionOptions, SimulationOptions};
 use inekf_client::table::EstimateState;
 use inekf_tests::drive::{CONFIG, config, drive, options, simulated};
 use inekf_tests::folder::Folder;
 use inekf_tests::in_process::{self, shifted};
-use inekf_tests::replay::{Replayed, replay};
+use inekf_tests::memory::Memory;
+use inekf_tests::process::{client, config_file};
+use inekf_tests::replay::{Replayed, replay, replay_smoothed};
 use inekf_tests::score::SECOND_NS;
 
 /// Replays at full speed and asserts that every byte is the oracle's; returns the replay.
@@ -49,6 +53,55 @@ fn the_same_folder_and_configuration_give_the_same_bytes_however_fast_and_howeve
             );
         }
     }
+}
+
+#[test]
+fn smoothed_states_are_the_same_bytes_however_fast_one_row_for_each_fix() {
+    let folder = Folder::of(&drive(1, 15.0));
+    let dataset = Dataset::load(folder.path()).unwrap();
+    let smoother = |wait| {
+        let config = config("estimator = 'smoother'", wait);
+        config.replace("[[heading_source]]\nid = 0\n", "[smoother]\nwindow = 5\n")
+    };
+    let expected = in_process::csv(&dataset, &smoother("event"), true);
+    let mut states: Option<Vec<u8>> = None;
+    for (wait, speed) in [("event", "max"), ("spin", "max"), ("event", "50")] {
+        let arguments = ["--covariance", "--speed", speed];
+        let (replayed, csv, rows) = replay_smoothed(folder.path(), &smoother(wait), &arguments);
+        assert!(replayed.csv == expected, "{wait}, speed {speed}");
+        let first = states.get_or_insert_with(|| csv.clone());
+        assert!(*first == csv, "{wait}, speed {speed}");
+
+        let positions = dataset.position.iter().map(|fix| fix.stamp_ns);
+        let velocities = dataset.velocity.iter().map(|fix| fix.stamp_ns);
+        let fixes: BTreeSet<u64> = positions.chain(velocities).collect();
+        assert!(rows.len() > 10 && rows.len() <= fixes.len());
+        assert!(rows.iter().all(|row| fixes.contains(&row.stamp_ns)));
+    }
+}
+
+#[test]
+fn a_filter_has_no_smoothed_states_and_the_replay_says_so() {
+    let folder = Folder::of(&drive(1, 5.0));
+    let memory = Memory::new();
+    let (_config, config) = config_file(CONFIG);
+    let out = folder.file("out.csv");
+    let smoothed = folder.file("smoothed.csv");
+    let arguments: [&std::ffi::OsStr; 8] = [
+        "replay".as_ref(),
+        folder.path().as_ref(),
+        "--config".as_ref(),
+        config.as_ref(),
+        "--out".as_ref(),
+        out.as_ref(),
+        "--smoothed".as_ref(),
+        smoothed.as_ref(),
+    ];
+    let ended = client(&memory, arguments);
+    assert!(
+        ended.failed_with_one_line(1).contains("no smoother"),
+        "{ended:?}"
+    );
 }
 
 #[test]

@@ -73,8 +73,45 @@ choice! {
         LcEkf = "lc-ekf",
         /// The invariant extended H-infinity filter, for comparison.
         InvariantHinf = "invariant-hinf",
+        /// The invariant smoother over the newest fixes.
+        Smoother = "smoother",
     }
-    not built: "smoother";
+}
+
+choice! {
+    /// What the states that have left the smoother's window leave behind.
+    pub enum Prior {
+        /// A mean on the group, and a frozen covariance.
+        Group = "group",
+        /// A mean in the coordinates at the point of marginalisation, and a frozen covariance.
+        Linear = "linear",
+        /// A mean on the group, and a covariance that is carried along; for comparison.
+        Recentred = "recentred",
+    }
+}
+
+choice! {
+    /// How the smoother attaches a correction to a state.
+    pub enum Parametrisation {
+        /// By the exponential of the group, in body coordinates: invariant smoothing.
+        Exponential = "exponential",
+        /// By the exponential of the group, in world coordinates.
+        Right = "right",
+        /// Rotation, velocity and position by themselves, the vectors in body axes.
+        Gtsam = "gtsam",
+        /// Rotation, velocity and position by themselves, the vectors in world axes.
+        Forster = "forster",
+    }
+}
+
+choice! {
+    /// How the smoother takes the derivatives of the residuals of motions and of its first prior.
+    pub enum Jacobians {
+        /// As if the residuals were zero: the gains are constants where the state has no biases.
+        Frozen = "frozen",
+        /// At the residuals.
+        Exact = "exact",
+    }
 }
 
 choice! {
@@ -241,6 +278,9 @@ mod tests {
         names_are_one_to_one(Invariance::as_str, Invariance::parse);
         names_are_one_to_one(Mismatch::as_str, Mismatch::parse);
         names_are_one_to_one(MismatchKind::as_str, MismatchKind::parse);
+        names_are_one_to_one(Prior::as_str, Prior::parse);
+        names_are_one_to_one(Parametrisation::as_str, Parametrisation::parse);
+        names_are_one_to_one(Jacobians::as_str, Jacobians::parse);
         names_are_one_to_one(Axis::as_str, Axis::parse);
         names_are_one_to_one(MissingPartner::as_str, MissingPartner::parse);
         names_are_one_to_one(HinfGain::as_str, HinfGain::parse);

@@ -33,7 +33,7 @@ impl Estimator {
                 Mismatch::Adaptive,
             ],
             Self::LcInekf | Self::LcEkf => &[Mismatch::Hard, Mismatch::Soft],
-            Self::Ekf | Self::InvariantHinf => &[Mismatch::None],
+            Self::Ekf | Self::InvariantHinf | Self::Smoother => &[Mismatch::None],
         }
     }
 }
@@ -42,11 +42,14 @@ impl Filter {
     /// Reads the three keys. `model` is None if it is not known: then nothing is held against it.
     pub(super) fn read(root: &mut Section<'_, '_>, model: Option<Model>) -> Self {
         let estimator = root.choice("estimator", Estimator::Inekf);
-        if model == Some(Model::Imu) && estimator != Estimator::Inekf {
+        let is_smoother = estimator == Estimator::Smoother;
+        if model == Some(Model::Imu) && !(is_smoother || estimator == Estimator::Inekf) {
             root.refuse(
                 "estimator",
-                "not built for model \"imu\", which has \"inekf\" only in this version",
+                "not built for model \"imu\", which has \"inekf\" and \"smoother\" only in this version",
             );
+        } else if model.is_some_and(Model::is_odometry) && is_smoother {
+            root.refuse("estimator", "built for model \"imu\" only in this version");
         }
         let invariance = root.choice("invariance", Invariance::Left);
         let mismatch = root.varying_choice("mismatch", default_treatment(estimator));
@@ -90,6 +93,11 @@ fn refuse_invariance(root: &mut Section<'_, '_>, estimator: Estimator, invarianc
         root.refuse(
             "invariance",
             "estimator = \"invariant-hinf\" is built with \"left\" only",
+        );
+    } else if estimator == Estimator::Smoother && invariance != Invariance::Left {
+        root.refuse(
+            "invariance",
+            "estimator = \"smoother\" is written with \"left\"; say [smoother] parametrisation = \"right\"",
         );
     }
 }

@@ -40,6 +40,7 @@ mod noise;
 mod odometry;
 mod operation;
 mod section;
+mod smoother;
 mod solvable;
 mod sources;
 mod stacking;
@@ -48,8 +49,8 @@ mod update;
 mod walk;
 
 pub use choice::{
-    Axis, Discretisation, Estimator, GapPolicy, HinfGain, Hold, Invariance, Level, Mismatch,
-    MismatchKind, MissingPartner, Model, Transport, WaitMode,
+    Axis, Discretisation, Estimator, GapPolicy, HinfGain, Hold, Invariance, Jacobians, Level,
+    Mismatch, MismatchKind, MissingPartner, Model, Parametrisation, Prior, Transport, WaitMode,
 };
 pub use fault::{ConfigFaults, Fault};
 pub use hinf::Hinf;
@@ -61,6 +62,7 @@ pub use motion::{Inertial, Motion, Odometry};
 pub use noise::{IncrementNoise, InertialNoise, OdometryNoise, RowSigmas, WhiteNoise};
 pub use odometry::Rows;
 pub use operation::{Health, Late, Runtime};
+pub use smoother::Smoother;
 pub use sources::{HeadingSource, PositionSource, VelocitySource};
 pub use stacking::Stacking;
 pub use update::Update;
@@ -96,6 +98,8 @@ pub struct Config {
     pub stacking: Option<Stacking>,
     /// The H-infinity filter; there if and only if it is the estimator.
     pub hinf: Option<Hinf>,
+    /// The smoother; there if and only if it is the estimator.
+    pub smoother: Option<Smoother>,
     /// Measurements that arrive late.
     pub late: Late,
     /// When the estimate is called degraded or stale.
@@ -124,9 +128,10 @@ impl Config {
         let initial = root.section("initial", |initial| {
             Initial::read(initial, model, top.biases)
         });
-        let update = root.section("update", Update::read);
+        let smooths = filter.estimator == Estimator::Smoother && root.is_sound("estimator");
+        let update = root.section("update", |update| Update::read(update, smooths));
         let position_sources = PositionSource::read_all(root, model);
-        let motion = Motion::read(root, model, top, tables);
+        let motion = Motion::read(root, model, smooths, top, tables);
 
         let ids: Vec<u32> = position_sources.iter().map(|source| source.id).collect();
         let known_ids = root.is_sound("position_source").then_some(&*ids);
@@ -159,6 +164,7 @@ impl Config {
             mismatched,
             stacking,
             hinf: Hinf::read_if_wanted(root, estimator),
+            smoother: Smoother::read_if_wanted(root, estimator),
             late: root.section("late", Late::read),
             health: root.section("health", Health::read),
             runtime: root.section("runtime", Runtime::read),

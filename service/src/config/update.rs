@@ -3,6 +3,7 @@
 use super::choice::Transport;
 use super::interval::Interval;
 use super::section::Section;
+use super::smoother::NOT_SMOOTHED;
 
 /// The measurement update.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,8 +19,9 @@ pub struct Update {
 }
 
 impl Update {
-    pub(super) fn read(update: &mut Section<'_, '_>) -> Self {
-        Self {
+    /// Reads the table for a filter, or for a smoother if it `smooths`.
+    pub(super) fn read(update: &mut Section<'_, '_>, smooths: bool) -> Self {
+        let read = Self {
             iterations: update.integer("iterations", None, 1..=50, 10),
             transport: update.choice("transport", Transport::Jacobian),
             gate_probability: update.optional_float(
@@ -28,12 +30,16 @@ impl Update {
                 Interval::open(0.0, 1.0),
             ),
             recover_after: update.integer("recover_after", None, 0..=1_000_000, 10),
+        };
+        if smooths {
+            update.refuse_all(&["iterations", "transport"], NOT_SMOOTHED);
         }
+        read
     }
 }
 
 impl Default for Update {
     fn default() -> Self {
-        Section::defaults(Self::read)
+        Section::defaults(|update| Self::read(update, false))
     }
 }

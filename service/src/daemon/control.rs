@@ -1,16 +1,22 @@
-//! Answers to control requests: reset, set state, snapshot, barrier.
+//! Answers to control requests: reset, set state, snapshot, barrier, smoothed window.
 
 use inekf_shared::message::{
     CONTROL_BARRIER, CONTROL_OK, CONTROL_REFUSED, CONTROL_RESET, CONTROL_SET_STATE,
-    CONTROL_SNAPSHOT, ControlRequest, ControlResponse, StateVector, Zero,
+    CONTROL_SMOOTHED, CONTROL_SNAPSHOT, ControlRequest, ControlResponse, StateVector, Zero,
 };
 
-use crate::engine::{Engine, Model};
+use super::smoothed::SmoothedPort;
+use crate::engine::{Engine, History, Model};
 
 /// Does what `request` asks, and answers. Whatever its bytes are, a refusal says why.
 ///
 /// Every input that was sent before the request must have been given to `engine` already.
-pub fn answer<M: Model>(engine: &mut Engine<M>, request: &ControlRequest) -> ControlResponse {
+pub fn answer<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
+    request: &ControlRequest,
+    smoothed: &mut SmoothedPort,
+) -> ControlResponse {
+    let mut published = 0;
     let outcome = match request.kind {
         CONTROL_RESET => {
             engine.reset();
@@ -21,6 +27,10 @@ pub fn answer<M: Model>(engine: &mut Engine<M>, request: &ControlRequest) -> Con
             .snapshot()
             .ok_or("there is no state yet: the daemon is not initialised"),
         CONTROL_BARRIER => Ok(StateVector::ZERO),
+        CONTROL_SMOOTHED => smoothed.answer(engine, request.request_id).map(|count| {
+            published = count;
+            StateVector::ZERO
+        }),
         _ => Err("the kind of request is unknown to this version"),
     };
     let (state_code, waiting_for) = engine.state();
@@ -33,6 +43,7 @@ pub fn answer<M: Model>(engine: &mut Engine<M>, request: &ControlRequest) -> Con
         counters: tally.counters,
         received: tally.received,
         rejected_by_reason: tally.rejected_by_reason,
+        smoothed: published,
         ..ControlResponse::ZERO
     };
     match outcome {

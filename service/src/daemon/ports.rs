@@ -16,6 +16,7 @@ use inekf_shared::transport::{
     TransportError, WakeListener,
 };
 
+use super::smoothed::SmoothedPort;
 use crate::config::WaitMode;
 use crate::engine::{MAX_AHEAD_NS, Model, Outbox};
 
@@ -176,6 +177,8 @@ pub struct Ports<M: Model> {
     pub inputs: Inputs<M::Sample>,
     /// What goes out.
     pub estimates: EstimatePort<M::Estimate>,
+    /// Smoothed states.
+    pub smoothed: SmoothedPort,
     /// Health, about once a second.
     pub health: Publisher<Health>,
     /// Requests.
@@ -186,12 +189,16 @@ pub struct Ports<M: Model> {
 }
 
 impl<M: Model> Ports<M> {
-    /// Opens every port of `instance` that waiting in this mode needs.
+    /// Opens every port of `instance` that waiting in this mode needs, and that of smoothed states for a smoother.
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy. If a daemon of this instance is
     /// running, the error names its process id.
-    pub fn open(instance: &Instance, wait: WaitMode) -> Result<Self, TransportError> {
+    pub fn open(
+        instance: &Instance,
+        wait: WaitMode,
+        smooths: bool,
+    ) -> Result<Self, TransportError> {
         let node = transport::open_node("inekf-service")?;
         // First of all: there is one server per instance, so a second daemon stops here.
         let control = transport::control(&node, instance)?.server()?;
@@ -219,6 +226,7 @@ impl<M: Model> Ports<M> {
                 foreign,
             },
             estimates: EstimatePort::new(estimates, latest),
+            smoothed: SmoothedPort::open(&node, instance, smooths)?,
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,

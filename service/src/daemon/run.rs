@@ -18,7 +18,7 @@ use super::ports::{EstimatePort, Inputs, Ports};
 use super::watch::{Moment, Watch};
 use crate::config::Config;
 use crate::engine::tally::Refusal;
-use crate::engine::{Engine, Model};
+use crate::engine::{Engine, History, Model};
 
 /// Empty looks at the inputs between two looks at the clock in spin mode.
 const SPINS_PER_LOOK: u32 = 64;
@@ -27,8 +27,8 @@ const SPINS_PER_LOOK: u32 = 64;
 ///
 /// # Errors
 /// A port that fails for good. What a sender wrote is never an error.
-pub fn run<M: Model>(
-    engine: &mut Engine<M>,
+pub fn run<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
     ports: &mut Ports<M>,
     config: &Config,
     stop: &AtomicBool,
@@ -40,7 +40,7 @@ pub fn run<M: Model>(
     );
     let bound = config.runtime.event_timeout();
     while !stop.load(Ordering::Relaxed) {
-        let samples = take_inputs(engine, &mut ports.inputs, &mut ports.estimates)?;
+        let samples = take_inputs(engine, ports)?;
         let now_ns = monotonic_ns();
         if samples > 0 {
             watch.arrival(now_ns);
@@ -57,28 +57,31 @@ pub fn run<M: Model>(
 }
 
 /// Takes everything that has arrived and is due. Returns the number of motion samples.
-fn take_inputs<M: Model>(
-    engine: &mut Engine<M>,
-    inputs: &mut Inputs<M::Sample>,
-    outbox: &mut EstimatePort<M::Estimate>,
+fn take_inputs<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
+    ports: &mut Ports<M>,
 ) -> anyhow::Result<u32> {
+    let (inputs, outbox) = (&mut ports.inputs, &mut ports.estimates);
     let mut samples = 0;
     while let Some(sample) = inputs.samples.receive().context("receiving samples")? {
         let received_ns = monotonic_ns();
         take_fixes(engine, inputs, sample.payload().header().stamp_ns, outbox)?;
         engine.sample(&sample, received_ns, outbox);
+        ports.smoothed.publish_left(engine);
         samples += 1;
     }
     // Fixes that came after the samples they belong to; before the first sample none is due.
     if let Some(now_ns) = engine.last_sample_ns() {
         take_fixes(engine, inputs, now_ns, outbox)?;
+        engine.settle(outbox);
+        ports.smoothed.publish_left(engine);
     }
     Ok(samples)
 }
 
 /// Takes the fixes up to `horizon_ns`.
-fn take_fixes<M: Model>(
-    engine: &mut Engine<M>,
+fn take_fixes<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
     inputs: &mut Inputs<M::Sample>,
     horizon_ns: u64,
     outbox: &mut EstimatePort<M::Estimate>,
@@ -95,17 +98,28 @@ fn take_fixes<M: Model>(
     Ok(())
 }
 
-fn answer_requests<M: Model>(engine: &mut Engine<M>, ports: &mut Ports<M>) -> anyhow::Result<()> {
+fn answer_requests<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
+    ports: &mut Ports<M>,
+) -> anyhow::Result<()> {
     while let Some(request) = ports.control.receive().context("receiving a request")? {
-        take_inputs(engine, &mut ports.inputs, &mut ports.estimates)?;
+        take_inputs(engine, ports)?;
+        let response = answer(engine, &request, &mut ports.smoothed);
         // A client that is gone by now has nobody to be answered.
-        let _ = request.send_copy(answer(engine, &request));
+        let _ = request.send_copy(response);
+        // A window that a request has ended.
+        ports.smoothed.publish_left(engine);
     }
     Ok(())
 }
 
 /// Publishes health, and counts what no other loop looks at: the samples of other models.
-fn report<M: Model>(engine: &mut Engine<M>, ports: &mut Ports<M>, watch: &mut Watch, now_ns: u64) {
+fn report<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
+    ports: &mut Ports<M>,
+    watch: &mut Watch,
+    now_ns: u64,
+) {
     ports.inputs.foreign.drain(|input, header| {
         engine.refuse(input, header, Refusal(REASON_WRONG_MODEL));
     });
@@ -114,7 +128,7 @@ fn report<M: Model>(engine: &mut Engine<M>, ports: &mut Ports<M>, watch: &mut Wa
         model: M::Estimate::MODEL,
         state: engine.state(),
         last_sample_ns: engine.last_sample_ns().unwrap_or(0),
-        failures: ports.estimates.failures,
+        failures: ports.estimates.failures + ports.smoothed.failures,
     };
     let arrivals = engine.tally().received[M::INPUT];
     let health = watch.report(&moment, arrivals, engine.tally());

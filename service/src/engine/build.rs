@@ -5,10 +5,12 @@ use inekf::lie::SE23;
 use inekf::model::NavState;
 
 use super::driver::Engine;
+use super::history::History;
 use super::inertial::InertialEngine;
 use super::model::Model;
 use super::odometry;
 use super::settings::Settings;
+use super::smoothing::SmoothingEngine;
 use crate::config::{Config, Invariance, Motion};
 
 /// What is done with an engine, whatever its type.
@@ -17,7 +19,7 @@ pub trait Use {
     type Output;
 
     /// Does it.
-    fn with<M: Model>(self, engine: Engine<M>) -> Self::Output;
+    fn with<M: Model, H: History<M>>(self, engine: Engine<M, H>) -> Self::Output;
 }
 
 /// Hands an engine of the configured model and filter to `user`.
@@ -35,6 +37,15 @@ pub fn build<U: Use>(config: &Config, user: U) -> Result<U::Output, UpdateError>
             return odometry::build::build(config, odometry, initial, fusion, user);
         }
     };
+    if let Some(smoother) = settings.smoother {
+        return Ok(if inertial.biases {
+            user.with(SmoothingEngine::<NavState, 15>::smoothing(
+                settings, &smoother,
+            ))
+        } else {
+            user.with(SmoothingEngine::<SE23, 9>::smoothing(settings, &smoother))
+        });
+    }
     let right = config.invariance == Some(Invariance::Right);
     Ok(match (right, inertial.biases) {
         (false, true) => user.with(InertialEngine::<NavState, Left, 15>::new(settings)),

@@ -3,20 +3,21 @@
 use inekf_shared::message::{
     Header, HeadingFix, INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY, PositionFix,
     REASON_BUFFER_FULL, REASON_INTERNAL, REASON_NOT_READY, REASON_OUT_OF_RANGE, STATE_ALIGNING,
-    STATE_WAITING, StateVector, VelocityFix, WAITING_FOR_IMU, WAITING_FOR_LEVEL,
+    STATE_WAITING, SmoothedState, StateVector, VelocityFix, WAITING_FOR_IMU, WAITING_FOR_LEVEL,
     WAITING_FOR_NOTHING, WAITING_FOR_POSITION, WAITING_FOR_REQUEST,
 };
 use inekf_shared::transport::InputMessage;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fix::{Antenna, Fix, Measurement};
+use super::history::{Breakdown, History, Insertion};
 use super::model::{Model, Preceding};
 use super::output::{Outbox, Output};
 use super::settings::{FusionSettings, PositionSource};
 use super::stack::{Missing, Offered, Stack};
 use super::tally::{Refusal, Tally};
 use super::time_base::{Continuity, TimeBase};
-use super::timeline::{Breakdown, Insertion, Timeline};
+use super::timeline::Timeline;
 
 /// A fix may be this far ahead of the last sample; beyond, its clock is not the samples' clock.
 pub const MAX_AHEAD_NS: u64 = 60_000_000_000;
@@ -24,12 +25,12 @@ pub const MAX_AHEAD_NS: u64 = 60_000_000_000;
 /// Fixes that may come between a requested state and the first sample that it waits for.
 const MAX_EARLY: usize = 64;
 
-/// A model behind the wire messages.
+/// A model behind the wire messages, with the history H of its estimate.
 #[derive(Debug)]
-pub struct Engine<M: Model> {
+pub struct Engine<M: Model, H = Timeline<M>> {
     model: M,
     fusion: FusionSettings,
-    timeline: Timeline<M>,
+    history: H,
     stack: Stack<M::Measurement>,
     time_base: TimeBase,
     /// The last position fix that came before there was a state, with its time.
@@ -46,10 +47,17 @@ pub struct Engine<M: Model> {
 }
 
 impl<M: Model> Engine<M> {
-    /// An engine that waits for its first samples, with all the memory it will ever use.
+    /// A filter that waits for its first samples, with all the memory it will ever use.
     pub fn of(model: M, fusion: FusionSettings) -> Self {
+        Self::with_history(model, fusion, Timeline::new(fusion))
+    }
+}
+
+impl<M: Model, H: History<M>> Engine<M, H> {
+    /// An engine that waits for its first samples, with all the memory it will ever use; `history` is empty.
+    pub fn with_history(model: M, fusion: FusionSettings, history: H) -> Self {
         Self {
-            timeline: Timeline::new(fusion),
+            history,
             stack: Stack::new(fusion.stack),
             time_base: TimeBase::new(model.restart_gap_ns()),
             first_position: None,
@@ -70,7 +78,7 @@ impl<M: Model> Engine<M> {
 
     /// `STATE_*` and `WAITING_FOR_*` now.
     pub fn state(&self) -> (u32, u32) {
-        if let Some((stamp_ns, _)) = self.timeline.newest() {
+        if let Some((stamp_ns, _)) = self.history.newest() {
             return (self.output.running_state(stamp_ns), WAITING_FOR_NOTHING);
         }
         let initial = self.model.initial();
@@ -94,7 +102,7 @@ impl<M: Model> Engine<M> {
 
     /// The current state and covariance, if there is one.
     pub fn snapshot(&self) -> Option<StateVector> {
-        self.timeline
+        self.history
             .newest()
             .map(|(stamp_ns, state)| self.model.snapshot(stamp_ns, state))
     }
@@ -118,7 +126,7 @@ impl<M: Model> Engine<M> {
         let checked = self.model.sample(sample, &before).and_then(|input| {
             // The sample of the very stamp the state was set at moves nothing, but it is the
             // input that holds from there on.
-            if self.timeline.awaits_input_at(stamp_ns) {
+            if self.history.awaits_input_at(stamp_ns) {
                 self.time_base.accept(header);
                 return Ok((input, Continuity::Next));
             }
@@ -143,26 +151,26 @@ impl<M: Model> Engine<M> {
         self.last_input = Some((stamp_ns, input));
         self.missing = 0;
         self.output.answer(header.seq, header.sent_ns, received_ns);
-        if self.timeline.newest().is_none() && !self.try_start(stamp_ns, &input) {
+        if self.history.newest().is_none() && !self.try_start(stamp_ns, &input) {
             return;
         }
         self.take_early(outbox);
         self.unstack(stamp_ns, outbox);
         if self
-            .timeline
+            .history
             .newest()
             .is_some_and(|(now, _)| now == stamp_ns)
         {
-            self.timeline.set_input(input);
+            self.history.set_input(input);
             return;
         }
         let Self {
             model,
-            timeline,
+            history,
             output,
             ..
         } = self;
-        let advanced = timeline.advance(model, stamp_ns, input, |event| {
+        let advanced = history.advance(model, stamp_ns, input, |event| {
             output.record(model, &event, outbox);
         });
         if let Err(Breakdown) = advanced {
@@ -193,6 +201,34 @@ impl<M: Model> Engine<M> {
     pub fn refuse(&mut self, input: usize, header: &Header, refusal: Refusal) {
         self.output.tally.receive(input, header);
         self.output.tally.refuse(refusal);
+    }
+
+    /// Takes in the fixes that were put off so as not to hold up a sample: call it when no sample waits.
+    pub fn settle(&mut self, outbox: &mut impl Outbox<M::Estimate>) {
+        let Self {
+            model,
+            history,
+            output,
+            ..
+        } = self;
+        history.settle(model, |event| output.record(model, &event, outbox));
+    }
+
+    /// Takes one of the states that have left the window of a smoother, in the order in which they left it.
+    pub fn take_left(&mut self) -> Option<SmoothedState> {
+        self.history.take_left()
+    }
+
+    /// Hands over the states in the window, oldest first, and says how many they are.
+    ///
+    /// # Errors
+    /// A sentence that says why there is none.
+    pub fn smoothed(&self, give: &mut dyn FnMut(&SmoothedState)) -> Result<usize, &'static str> {
+        match self.history.smoothed(give) {
+            None => Err("the estimator is no smoother: there is no window of smoothed states"),
+            Some(0) => Err("there is no state yet: the daemon is not initialised"),
+            Some(count) => Ok(count),
+        }
     }
 
     /// Forgets the state and initialises anew.
@@ -245,13 +281,13 @@ impl<M: Model> Engine<M> {
             Ok(fix) => fix,
             Err(refusal) => return self.output.tally.refuse(refusal),
         };
-        if self.timeline.newest().is_none() {
+        if self.history.newest().is_none() {
             return self.keep_first(fix);
         }
         self.take(fix, outbox);
     }
 
-    /// Puts a fix on the timeline, once it has its partner.
+    /// Hands a fix to the history, once it has its partner.
     fn take(&mut self, fix: Fix<M::Measurement>, outbox: &mut impl Outbox<M::Estimate>) {
         let ahead_ns = |now_ns| fix.stamp_ns.saturating_sub(now_ns);
         if self
@@ -295,11 +331,11 @@ impl<M: Model> Engine<M> {
     fn insert(&mut self, fix: Fix<M::Measurement>, outbox: &mut impl Outbox<M::Estimate>) {
         let Self {
             model,
-            timeline,
+            history,
             output,
             ..
         } = self;
-        let insertion = timeline.insert(model, fix, |event| output.record(model, &event, outbox));
+        let insertion = history.insert(model, fix, |event| output.record(model, &event, outbox));
         match insertion {
             Insertion::Waiting | Insertion::Judged => {}
             Insertion::TooLate => self.output.tally.counters.late += fix.count(),
@@ -387,19 +423,19 @@ impl<M: Model> Engine<M> {
         self.early = early;
         self.requested = None;
         self.output.started(stamp_ns, &self.model.place_w(&state));
-        self.timeline.start(stamp_ns, input, state);
+        self.history.start(stamp_ns, input, state);
         self.time_base.advance_to(stamp_ns);
     }
 
     /// Forgets the state. The fixes that still waited for a sample are counted, as every input is.
     fn forget(&mut self) {
-        let waiting = self.timeline.waiting()
+        let waiting = self.history.waiting()
             + self.stack.clear() as u64
             + self.early.len() as u64
             + u64::from(self.first_position.is_some());
         let tally = &mut self.output.tally;
         tally.refuse_all(Refusal(REASON_NOT_READY), waiting);
-        self.timeline.clear();
+        self.history.clear();
         self.early.clear();
         self.model.forget_attitude();
         self.first_position = None;

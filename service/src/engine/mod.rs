@@ -8,13 +8,15 @@
 //!   [`odometry`]: the models `odometry2d` and `odometry3d`; [`mod@build`]: from a configuration to one of them
 //! - [`intake`]: checks; [`tally`]: counters; [`time_base`]: jumps of the clock
 //! - [`levelling`], [`set_state`]: the first state
-//! - [`timeline`]: samples, fixes at their own stamps, late ones by replay; [`stack`]: fixes taken together;
+//! - [`history`]: samples, fixes at their own stamps, late ones; [`timeline`]: those of a filter; [`smoothing`]: those of
+//!   a smoother; [`stack`]: fixes taken together;
 //!   [`recovery`]: out of a lock-out
 //! - [`output`]: the messages
 
 pub mod build;
 pub mod driver;
 pub mod fix;
+pub mod history;
 pub mod inertial;
 pub mod intake;
 pub mod levelling;
@@ -24,6 +26,7 @@ pub mod output;
 pub mod recovery;
 pub mod set_state;
 pub mod settings;
+pub mod smoothing;
 pub mod stack;
 pub mod tally;
 pub mod time_base;
@@ -31,6 +34,7 @@ pub mod timeline;
 
 pub use build::{Use, build};
 pub use driver::{Engine, MAX_AHEAD_NS};
+pub use history::History;
 pub use inertial::{Inertial, InertialEngine};
 pub use model::Model;
 pub use output::Outbox;

@@ -8,9 +8,9 @@ use inekf_shared::message::{
 use nalgebra::Vector3;
 
 use super::fix::{Fix, FixKind, Measurement};
+use super::history::Event;
 use super::model::{Fused, Model};
 use super::tally::{Refusal, Tally};
-use super::timeline::Event;
 
 /// Where estimates go. The daemon's publishes them; a test's collects them.
 pub trait Outbox<E> {

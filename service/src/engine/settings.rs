@@ -3,13 +3,15 @@
 use inekf::filter::{Alignment, BiasPrior, Gate, Transport, UpdateOptions};
 use inekf::lie::SO3;
 use inekf::model::{Discretisation, ImuNoise};
+use inekf::smoother::{Jacobians, PriorForm, WindowOptions};
 use inekf_shared::message::MAX_SOURCES;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fix::{Antenna, FixKind};
 use super::stack::{Missing, StackSettings};
 use crate::config::{
-    self, Config, GapPolicy, Hold, Inertial, Level, MissingPartner, Motion, WhiteNoise,
+    self, Config, GapPolicy, Hold, Inertial, Level, MissingPartner, Motion, Parametrisation,
+    WhiteNoise,
 };
 
 /// The IMU: what it may say, how its samples are held, its noise.
@@ -198,6 +200,15 @@ impl FusionSettings {
     }
 }
 
+/// The smoother.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SmootherSettings {
+    /// How a correction is attached to a state.
+    pub parametrisation: Parametrisation,
+    /// The rest. Its gate is open: fixes are judged before they enter.
+    pub window: WindowOptions,
+}
+
 /// Everything.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -207,6 +218,8 @@ pub struct Settings {
     pub initial: InitialSettings,
     /// How fixes are fused.
     pub fusion: FusionSettings,
+    /// The smoother, if that is the estimator.
+    pub smoother: Option<SmootherSettings>,
 }
 
 /// Standard deviation per axis of a position that comes without one, m: the configuration's default.
@@ -232,6 +245,7 @@ impl Settings {
             },
             initial: initial(config),
             fusion: fusion(config),
+            smoother: config.smoother.as_ref().map(smoother),
         }
     }
 }
@@ -257,6 +271,27 @@ fn imu(inertial: &Inertial) -> ImuSettings {
         },
         gap_gyro_sigma: GAP_GYRO_SIGMA,
         gap_accel_sigma: GAP_ACCEL_SIGMA,
+    }
+}
+
+fn smoother(smoother: &config::Smoother) -> SmootherSettings {
+    let (first_prior, jacobians) = match smoother.jacobians {
+        config::Jacobians::Frozen => (PriorForm::GroupMean, Jacobians::Frozen),
+        config::Jacobians::Exact => (PriorForm::Recentred, Jacobians::Exact),
+    };
+    SmootherSettings {
+        parametrisation: smoother.parametrisation,
+        window: WindowOptions {
+            iterations: smoother.iterations as usize,
+            first_prior,
+            prior: match smoother.prior {
+                config::Prior::Group => PriorForm::GroupMean,
+                config::Prior::Linear => PriorForm::Linear,
+                config::Prior::Recentred => PriorForm::Recentred,
+            },
+            jacobians,
+            ..WindowOptions::new(smoother.window)
+        },
     }
 }
 

@@ -7,16 +7,13 @@
 
 use std::collections::VecDeque;
 
-use inekf::filter::{UpdateError, Verdict};
-use inekf_shared::message::MAX_SOURCES;
+use inekf::filter::UpdateError;
 
-use super::fix::{Fix, FixKind};
+use super::fix::Fix;
+use super::history::{Breakdown, Event, History, Insertion, MAX_FIXES};
 use super::model::{Fused, Model};
-use super::recovery::Widening;
+use super::recovery::{Lockout, Widening};
 use super::settings::FusionSettings;
-
-/// Fixes that may wait or be remembered at one time.
-const MAX_FIXES: usize = 1024;
 
 /// A sample, and the state at its stamp after the fixes due by then.
 #[derive(Clone, Copy, Debug)]
@@ -35,48 +32,6 @@ struct Entry<Z> {
     widened: Option<Widening>,
 }
 
-/// Something worth publishing.
-#[derive(Clone, Copy, Debug)]
-pub enum Event<'a, X, Z> {
-    /// The state was propagated to `stamp_ns`.
-    Propagated {
-        /// Time of the state.
-        stamp_ns: u64,
-        /// After the sample.
-        state: &'a X,
-    },
-    /// A fix was judged.
-    Judged {
-        /// Time of the state: the fix's own stamp, or the newest one after a replay.
-        stamp_ns: u64,
-        /// After the fix.
-        state: &'a X,
-        /// The fix.
-        fix: &'a Fix<Z>,
-        /// What it did.
-        outcome: Result<Fused, UpdateError>,
-        /// Whether samples were replayed.
-        replayed: bool,
-    },
-}
-
-/// What became of a fix that was handed in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Insertion {
-    /// It lies ahead and waits for the next sample.
-    Waiting,
-    /// It was judged; an event was emitted.
-    Judged,
-    /// It is older than the window.
-    TooLate,
-    /// No room for more fixes.
-    Full,
-}
-
-/// The state broke down (not finite, or diverged); the timeline must be started anew.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Breakdown;
-
 /// The moving window of knots and fixes.
 #[derive(Debug)]
 pub struct Timeline<M: Model> {
@@ -84,7 +39,7 @@ pub struct Timeline<M: Model> {
     knots: VecDeque<Knot<M::Input, M::State>>,
     /// Sorted by [`Fix::order`].
     entries: Vec<Entry<M::Measurement>>,
-    gated_in_a_row: [[u32; MAX_SOURCES]; FixKind::COUNT],
+    lockout: Lockout,
 }
 
 impl<M: Model> Timeline<M> {
@@ -94,13 +49,122 @@ impl<M: Model> Timeline<M> {
             fusion,
             knots: VecDeque::with_capacity(fusion.late_capacity.max(2)),
             entries: Vec::with_capacity(MAX_FIXES),
-            gated_in_a_row: Default::default(),
+            lockout: Lockout::new(fusion.recover_after),
         }
     }
 
-    /// Forgets everything and starts from `state` at `stamp_ns`; `input` is the sample of that
-    /// stamp if there is one.
-    pub fn start(&mut self, stamp_ns: u64, input: Option<M::Input>, state: M::State) {
+    /// Propagates from a knot to the sample at `stamp_ns`, stopping at each fix on the way (and,
+    /// after the sample, at those of its very stamp) to hand the state to `pass`.
+    fn run_interval(
+        &mut self,
+        model: &M,
+        from: &Knot<M::Input, M::State>,
+        stamp_ns: u64,
+        input: M::Input,
+        pass: &mut impl FnMut(&mut Self, usize, Passed<'_, M::State>),
+    ) -> Knot<M::Input, M::State> {
+        let motion = model.motion(from.input.as_ref(), &input, stamp_ns - from.stamp_ns);
+        let move_to = |state: &mut M::State, now_ns: &mut u64, to_ns: u64| {
+            if to_ns > *now_ns {
+                model.advance(state, &motion, to_ns - *now_ns);
+                *now_ns = to_ns;
+            }
+        };
+
+        let mut state = from.state;
+        let mut now_ns = from.stamp_ns;
+        let mut index = self
+            .entries
+            .partition_point(|entry| entry.fix.stamp_ns <= from.stamp_ns);
+        while let Some(entry) = self.entries.get(index) {
+            let fix_ns = entry.fix.stamp_ns;
+            if fix_ns >= stamp_ns {
+                break;
+            }
+            move_to(&mut state, &mut now_ns, fix_ns);
+            pass(self, index, Passed::Fix(&mut state));
+            index += 1;
+        }
+        move_to(&mut state, &mut now_ns, stamp_ns);
+        pass(self, index, Passed::Sample(&state));
+        while self
+            .entries
+            .get(index)
+            .is_some_and(|entry| entry.fix.stamp_ns == stamp_ns)
+        {
+            pass(self, index, Passed::Fix(&mut state));
+            index += 1;
+        }
+        Knot {
+            stamp_ns,
+            input: Some(input),
+            state,
+        }
+    }
+
+    /// Fuses the fix at `index` into `state`, or gates it. Only a `fresh` decision counts towards
+    /// lock-out recovery; a replay repeats the widening decided then.
+    fn judge(
+        &mut self,
+        model: &M,
+        index: usize,
+        state: &mut M::State,
+        fresh: bool,
+    ) -> Result<Fused, UpdateError> {
+        let Entry { fix, widened } = self.entries[index];
+        if let (false, Some(widening)) = (fresh, widened) {
+            return model.fuse_widened(state, &fix, &widening);
+        }
+        let outcome = model.fuse(state, &fix, true);
+        if !fresh {
+            return outcome;
+        }
+        if let Some(nis) = self.lockout.broken_by(&fix, &outcome) {
+            let widening = model.widening(state, &fix, nis);
+            self.entries[index].widened = Some(widening);
+            return model.fuse_widened(state, &fix, &widening);
+        }
+        outcome
+    }
+
+    /// Appends a knot, forgetting what has left the window.
+    fn push(&mut self, knot: Knot<M::Input, M::State>) {
+        let capacity = self.fusion.late_capacity.max(2);
+        while self.knots.len() >= capacity {
+            self.knots.pop_front();
+        }
+        self.knots.push_back(knot);
+        // Two knots always stay: the newest, and the one before it for fixes of its stamp.
+        while self.knots.len() > 2
+            && knot.stamp_ns - self.knots[1].stamp_ns > self.fusion.late_window_ns
+        {
+            self.knots.pop_front();
+        }
+        self.forget_old_entries();
+    }
+
+    /// Forgets the fixes that no replay can reach any more.
+    fn forget_old_entries(&mut self) {
+        let oldest_ns = self.knots.front().map_or(0, |knot| knot.stamp_ns);
+        let forgotten = self
+            .entries
+            .partition_point(|entry| entry.fix.stamp_ns <= oldest_ns);
+        self.entries.drain(..forgotten);
+    }
+
+    /// Makes room for one more fix where the window holds too many: shortens it, for a fix that is
+    /// on time is worth more than the chance of a late one. False if all of them still wait.
+    fn make_room(&mut self) -> bool {
+        while self.entries.len() >= MAX_FIXES && self.knots.len() > 2 {
+            self.knots.pop_front();
+            self.forget_old_entries();
+        }
+        self.entries.len() < MAX_FIXES
+    }
+}
+
+impl<M: Model> History<M> for Timeline<M> {
+    fn start(&mut self, stamp_ns: u64, input: Option<M::Input>, state: M::State) {
         self.clear();
         self.knots.push_back(Knot {
             stamp_ns,
@@ -109,15 +173,13 @@ impl<M: Model> Timeline<M> {
         });
     }
 
-    /// Forgets everything.
-    pub fn clear(&mut self) {
+    fn clear(&mut self) {
         self.knots.clear();
         self.entries.clear();
-        self.gated_in_a_row = Default::default();
+        self.lockout.clear();
     }
 
-    /// Number of messages whose fixes lie ahead of the newest knot.
-    pub fn waiting(&self) -> u64 {
+    fn waiting(&self) -> u64 {
         let newest_ns = self.knots.back().map_or(0, |knot| knot.stamp_ns);
         let passed = self
             .entries
@@ -126,31 +188,23 @@ impl<M: Model> Timeline<M> {
         ahead.iter().map(|entry| entry.fix.count()).sum()
     }
 
-    /// The newest stamp and state, if started.
-    pub fn newest(&self) -> Option<(u64, &M::State)> {
+    fn newest(&self) -> Option<(u64, &M::State)> {
         self.knots.back().map(|knot| (knot.stamp_ns, &knot.state))
     }
 
-    /// Whether the state was set at `stamp_ns` and the sample of that stamp has not come yet.
-    pub fn awaits_input_at(&self, stamp_ns: u64) -> bool {
+    fn awaits_input_at(&self, stamp_ns: u64) -> bool {
         self.knots
             .back()
             .is_some_and(|knot| knot.stamp_ns == stamp_ns && knot.input.is_none())
     }
 
-    /// Gives the newest knot its sample.
-    pub fn set_input(&mut self, input: M::Input) {
+    fn set_input(&mut self, input: M::Input) {
         if let Some(knot) = self.knots.back_mut() {
             knot.input = Some(input);
         }
     }
 
-    /// Moves on to a sample at `stamp_ns`, which must be later than the newest knot, fusing the
-    /// waiting fixes on the way. Emits an event for the sample and for each fix.
-    ///
-    /// # Errors
-    /// [`Breakdown`] if the state is no longer sound.
-    pub fn advance(
+    fn advance(
         &mut self,
         model: &M,
         stamp_ns: u64,
@@ -189,8 +243,7 @@ impl<M: Model> Timeline<M> {
         if sound { Ok(()) } else { Err(Breakdown) }
     }
 
-    /// Takes in a fix: ahead of the newest knot it waits, at or before it it is fused at once.
-    pub fn insert(
+    fn insert(
         &mut self,
         model: &M,
         fix: Fix<M::Measurement>,
@@ -263,123 +316,6 @@ impl<M: Model> Timeline<M> {
             });
         }
         Insertion::Judged
-    }
-
-    /// Propagates from a knot to the sample at `stamp_ns`, stopping at each fix on the way (and,
-    /// after the sample, at those of its very stamp) to hand the state to `pass`.
-    fn run_interval(
-        &mut self,
-        model: &M,
-        from: &Knot<M::Input, M::State>,
-        stamp_ns: u64,
-        input: M::Input,
-        pass: &mut impl FnMut(&mut Self, usize, Passed<'_, M::State>),
-    ) -> Knot<M::Input, M::State> {
-        let motion = model.motion(from.input.as_ref(), &input, stamp_ns - from.stamp_ns);
-        let move_to = |state: &mut M::State, now_ns: &mut u64, to_ns: u64| {
-            if to_ns > *now_ns {
-                model.advance(state, &motion, to_ns - *now_ns);
-                *now_ns = to_ns;
-            }
-        };
-
-        let mut state = from.state;
-        let mut now_ns = from.stamp_ns;
-        let mut index = self
-            .entries
-            .partition_point(|entry| entry.fix.stamp_ns <= from.stamp_ns);
-        while let Some(entry) = self.entries.get(index) {
-            let fix_ns = entry.fix.stamp_ns;
-            if fix_ns >= stamp_ns {
-                break;
-            }
-            move_to(&mut state, &mut now_ns, fix_ns);
-            pass(self, index, Passed::Fix(&mut state));
-            index += 1;
-        }
-        move_to(&mut state, &mut now_ns, stamp_ns);
-        pass(self, index, Passed::Sample(&state));
-        while self
-            .entries
-            .get(index)
-            .is_some_and(|entry| entry.fix.stamp_ns == stamp_ns)
-        {
-            pass(self, index, Passed::Fix(&mut state));
-            index += 1;
-        }
-        Knot {
-            stamp_ns,
-            input: Some(input),
-            state,
-        }
-    }
-
-    /// Fuses the fix at `index` into `state`, or gates it. Only a `fresh` decision counts towards
-    /// lock-out recovery; a replay repeats the widening decided then.
-    fn judge(
-        &mut self,
-        model: &M,
-        index: usize,
-        state: &mut M::State,
-        fresh: bool,
-    ) -> Result<Fused, UpdateError> {
-        let Entry { fix, widened } = self.entries[index];
-        if let (false, Some(widening)) = (fresh, widened) {
-            return model.fuse_widened(state, &fix, &widening);
-        }
-        let outcome = model.fuse(state, &fix, true);
-        if !fresh {
-            return outcome;
-        }
-        let in_a_row = &mut self.gated_in_a_row[fix.kind() as usize][fix.source as usize];
-        match outcome {
-            Ok(fused) if fused.verdict == Verdict::Gated => {
-                *in_a_row += 1;
-                if self.fusion.recover_after > 0 && *in_a_row > self.fusion.recover_after {
-                    *in_a_row = 0;
-                    let widening = model.widening(state, &fix, fused.nis);
-                    self.entries[index].widened = Some(widening);
-                    return model.fuse_widened(state, &fix, &widening);
-                }
-            }
-            _ => *in_a_row = 0,
-        }
-        outcome
-    }
-
-    /// Appends a knot, forgetting what has left the window.
-    fn push(&mut self, knot: Knot<M::Input, M::State>) {
-        let capacity = self.fusion.late_capacity.max(2);
-        while self.knots.len() >= capacity {
-            self.knots.pop_front();
-        }
-        self.knots.push_back(knot);
-        // Two knots always stay: the newest, and the one before it for fixes of its stamp.
-        while self.knots.len() > 2
-            && knot.stamp_ns - self.knots[1].stamp_ns > self.fusion.late_window_ns
-        {
-            self.knots.pop_front();
-        }
-        self.forget_old_entries();
-    }
-
-    /// Forgets the fixes that no replay can reach any more.
-    fn forget_old_entries(&mut self) {
-        let oldest_ns = self.knots.front().map_or(0, |knot| knot.stamp_ns);
-        let forgotten = self
-            .entries
-            .partition_point(|entry| entry.fix.stamp_ns <= oldest_ns);
-        self.entries.drain(..forgotten);
-    }
-
-    /// Makes room for one more fix where the window holds too many: shortens it, for a fix that is
-    /// on time is worth more than the chance of a late one. False if all of them still wait.
-    fn make_room(&mut self) -> bool {
-        while self.entries.len() >= MAX_FIXES && self.knots.len() > 2 {
-            self.knots.pop_front();
-            self.forget_old_entries();
-        }
-        self.entries.len() < MAX_FIXES
     }
 }
 

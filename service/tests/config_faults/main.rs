@@ -104,7 +104,10 @@ fn each_fault_at_the_top_of_the_file() {
         (
             "estimator = \"lc-inekf\"",
             "estimator",
-            &["not built for model \"imu\"", "\"inekf\" only"],
+            &[
+                "not built for model \"imu\"",
+                "\"inekf\" and \"smoother\" only",
+            ],
         ),
         (
             "estimator = \"smother\"",
@@ -112,9 +115,9 @@ fn each_fault_at_the_top_of_the_file() {
             &["did you mean \"smoother\"?"],
         ),
         (
-            "estimator = \"smoother\"",
-            "estimator",
-            &["not built in this version", "\"lc-inekf\""],
+            "estimator = \"smoother\"\ninvariance = \"right\"",
+            "invariance",
+            &["parametrisation = \"right\""],
         ),
         (
             "mismatch = \"consider\"",
@@ -399,7 +402,7 @@ fn the_ninth_source_is_one_too_many() {
 #[test]
 fn ten_faults_are_reported_as_those_ten() {
     let text = "\
-estimator = 'smoother'
+estimator = 'smother'
 hold = 'sideways'
 gravity_mps2 = inf
 
@@ -607,4 +610,62 @@ fn files_that_cannot_be_read_say_why() {
         Config::load(&sound).is_ok(),
         "a file of exactly the limit is read"
     );
+}
+
+#[test]
+fn each_fault_about_the_smoother() {
+    let smoother = "estimator = \"smoother\"";
+    let cases: [(&str, &str, &str, &[&str]); 8] = [
+        (
+            smoother,
+            "[smoother]\nwindow = 0",
+            "smoother.window",
+            &["1 to 1000"],
+        ),
+        (
+            smoother,
+            "[smoother]\niterations = 11",
+            "smoother.iterations",
+            &["1 to 10"],
+        ),
+        (
+            smoother,
+            "[smoother]\nprior = \"linaer\"",
+            "smoother.prior",
+            &["did you mean \"linear\"?"],
+        ),
+        (
+            smoother,
+            "[smoother]\nparametrisation = \"left\"",
+            "smoother.parametrisation",
+            &["\"exponential\", \"right\", \"gtsam\", \"forster\""],
+        ),
+        (
+            "",
+            "[smoother]\nwindow = 10",
+            "smoother",
+            &["needs estimator = \"smoother\""],
+        ),
+        (
+            smoother,
+            "[update]\ntransport = \"none\"",
+            "update.transport",
+            &["[smoother] iterations"],
+        ),
+        (
+            smoother,
+            "[[heading_source]]\nid = 0",
+            "heading_source",
+            &["position and velocity only"],
+        ),
+        (
+            "estimator = \"smoother\"\nmismatch = \"consider\"",
+            "",
+            "mismatch",
+            &["not built for model \"imu\""],
+        ),
+    ];
+    for (top, tables, key, words) in cases {
+        assert_single(&text(top, tables), key, words);
+    }
 }

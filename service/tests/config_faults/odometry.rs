@@ -58,7 +58,7 @@ fn the_noise_of_a_row_grows_with_its_time_its_way_and_its_turn() {
 fn each_fault_of_a_file_of_odometry() {
     let plane = "odometry2d";
     let space = "odometry3d";
-    let cases: [(&str, &str, &str, &str, &[&str]); 35] = [
+    let cases: [(&str, &str, &str, &str, &[&str]); 36] = [
         (
             plane,
             "biases = false",
@@ -300,6 +300,13 @@ fn each_fault_of_a_file_of_odometry() {
             "[hinf]",
             "hinf",
             &["needs estimator = \"invariant-hinf\""],
+        ),
+        (
+            plane,
+            "estimator = \"smoother\"",
+            "",
+            "estimator",
+            &["built for model \"imu\" only"],
         ),
     ];
     for (model, top, tables, key, words) in cases {

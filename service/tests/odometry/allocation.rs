@@ -3,7 +3,7 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use inekf_service::engine::{Engine, Model, Outbox, Use, build};
+use inekf_service::engine::{Engine, History, Model, Outbox, Use, build};
 
 use super::harness::{
     CHOICES, Input, PERIOD, START, feed, fix, parse, planar_state, plane, space, spatial_state,
@@ -61,7 +61,7 @@ struct Allocations<'a>(&'a [Input]);
 impl Use for Allocations<'_> {
     type Output = (u64, u64);
 
-    fn with<M: Model>(self, mut engine: Engine<M>) -> (u64, u64) {
+    fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) -> (u64, u64) {
         let mut sink = Sink(0);
         let before = ALLOCATIONS.get();
         for input in self.0 {

@@ -3,7 +3,7 @@
 use std::any::Any;
 
 use inekf_service::config::Config;
-use inekf_service::engine::{Engine, Model, Outbox, Use, build};
+use inekf_service::engine::{Engine, History, Model, Outbox, Use, build};
 use inekf_shared::message::{
     Counters, EstimateHead, EstimateMessage, EstimateSe2, EstimateSe3, Header, INPUTS,
     MAX_MISMATCHES, MODEL_ODOMETRY_2D, MODEL_ODOMETRY_3D, Odometry2d, Odometry3d, PositionFix,
@@ -119,8 +119,8 @@ impl Outcome {
 }
 
 /// Feeds one input to an engine of whatever model; rows of another model are a mistake of the test.
-pub fn feed<M: Model>(
-    engine: &mut Engine<M>,
+pub fn feed<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
     input: &Input,
     outbox: &mut impl Outbox<M::Estimate>,
 ) -> Result<(), &'static str> {
@@ -145,7 +145,7 @@ struct Feed<'a>(&'a [Input]);
 impl Use for Feed<'_> {
     type Output = Outcome;
 
-    fn with<M: Model>(self, mut engine: Engine<M>) -> Outcome {
+    fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) -> Outcome {
         let mut outbox = All::default();
         let mut refusals = Vec::new();
         for input in self.0 {

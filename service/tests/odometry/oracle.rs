@@ -6,7 +6,7 @@ use std::any::Any;
 use std::path::{Path, PathBuf};
 
 use inekf_service::config::Config;
-use inekf_service::engine::{Engine, Model, Outbox, Use, build};
+use inekf_service::engine::{Engine, History, Model, Outbox, Use, build};
 use inekf_shared::message::{
     EstimateMessage, EstimateSe2, Header, MODEL_ODOMETRY_2D, Odometry2d, PositionFix, StateVector,
     Zero, triangle_index,
@@ -106,7 +106,7 @@ impl<E: EstimateMessage> Outbox<E> for LastOfStamp {
 impl Use for Feed<'_> {
     type Output = Vec<EstimateSe2>;
 
-    fn with<M: Model>(self, mut engine: Engine<M>) -> Vec<EstimateSe2> {
+    fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) -> Vec<EstimateSe2> {
         let mut outbox = LastOfStamp(Vec::new());
         if let Some(state) = &self.0.state {
             engine.set_state(state).unwrap();

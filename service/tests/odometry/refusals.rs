@@ -4,7 +4,7 @@ use std::process::Command;
 
 use inekf::filter::UpdateError;
 use inekf_service::config::{Config, Mismatched, Wrong};
-use inekf_service::engine::{Engine, Model, Use, build};
+use inekf_service::engine::{Engine, History, Model, Use, build};
 
 use super::harness::parse;
 
@@ -20,7 +20,7 @@ struct Nothing;
 impl Use for Nothing {
     type Output = ();
 
-    fn with<M: Model>(self, _engine: Engine<M>) {}
+    fn with<M: Model, H: History<M>>(self, _engine: Engine<M, H>) {}
 }
 
 #[test]

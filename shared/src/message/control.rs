@@ -14,6 +14,8 @@ pub const CONTROL_SET_STATE: u32 = 2;
 pub const CONTROL_SNAPSHOT: u32 = 3;
 /// Request: answer when every input sent before has been processed.
 pub const CONTROL_BARRIER: u32 = 4;
+/// Request: publish the states in the window of the smoother.
+pub const CONTROL_SMOOTHED: u32 = 5;
 
 /// Name of a kind of request; `"unknown"` for a code that is not defined.
 #[must_use]
@@ -23,6 +25,7 @@ pub const fn control_kind_name(code: u32) -> &'static str {
         CONTROL_SET_STATE => "set-state",
         CONTROL_SNAPSHOT => "snapshot",
         CONTROL_BARRIER => "barrier",
+        CONTROL_SMOOTHED => "smoothed",
         _ => "unknown",
     }
 }
@@ -105,7 +108,7 @@ layout! {
 /// What the daemon answers.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.ControlResponse.v2")]
+#[type_name("inekf.ControlResponse.v3")]
 pub struct ControlResponse {
     /// The id of the request.
     pub request_id: u64,
@@ -126,14 +129,16 @@ pub struct ControlResponse {
     pub received: [u64; INPUTS],
     /// Rejected inputs, indexed by `REASON_*` code.
     pub rejected_by_reason: [u64; REASONS],
+    /// With [`CONTROL_SMOOTHED`] how many states have been published on the topic `smoothed`, else zero.
+    pub smoothed: u64,
     /// The current state with [`CONTROL_SNAPSHOT`], else zero.
     pub state: StateVector,
 }
 
 layout! {
-    ControlResponse as "inekf.ControlResponse.v2", size 1608, align 8 {
+    ControlResponse as "inekf.ControlResponse.v3", size 1616, align 8 {
         request_id: 0, status: 8, state_code: 12, waiting_for: 16, reason_len: 20, reason: 24,
-        counters: 280, received: 328, rejected_by_reason: 376, state: 504,
+        counters: 280, received: 328, rejected_by_reason: 376, smoothed: 504, state: 512,
     }
 }
 

@@ -22,12 +22,13 @@ pub mod imu;
 pub mod odometry;
 pub mod position;
 mod serde_array;
+pub mod smoothed;
 pub mod velocity;
 
 pub use control::{
     CONTROL_BARRIER, CONTROL_OK, CONTROL_REFUSED, CONTROL_RESET, CONTROL_SET_STATE,
-    CONTROL_SNAPSHOT, ControlRequest, ControlResponse, REASON_TEXT_LEN, StateVector,
-    control_kind_name, control_status_name,
+    CONTROL_SMOOTHED, CONTROL_SNAPSHOT, ControlRequest, ControlResponse, REASON_TEXT_LEN,
+    StateVector, control_kind_name, control_status_name,
 };
 pub use estimate::{
     Counters, ESTIMATE_DEGRADED, ESTIMATE_FLAGS, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED,
@@ -50,6 +51,7 @@ pub use imu::ImuSample;
 pub use layout::{Message, Zero};
 pub use odometry::{Odometry2d, Odometry3d};
 pub use position::PositionFix;
+pub use smoothed::{SMOOTHED_CUT, SMOOTHED_FLAGS, SmoothedState};
 pub use velocity::VelocityFix;
 
 /// How many sources of position an estimate reports on: source ids are `0..MAX_SOURCES`.

@@ -14,7 +14,7 @@ use super::{Node, TransportError};
 use crate::message::{
     ControlRequest, ControlResponse, EstimateMessage, EstimateSe2, EstimateSe3, EstimateSe23,
     Header, HeadingFix, Health, ImuSample, Message, Odometry2d, Odometry3d, PositionFix,
-    VelocityFix,
+    SmoothedState, VelocityFix,
 };
 use crate::qos::{self, PubSubQos};
 use crate::topic::{Instance, Topic};
@@ -101,6 +101,14 @@ pub fn estimate<E: EstimateMessage>(
     instance: &Instance,
 ) -> Result<PubSub<E>, TransportError> {
     pub_sub(node, instance, Topic::Estimate)
+}
+
+/// Opens the smoothed states of an instance.
+///
+/// # Errors
+/// As [`input`].
+pub fn smoothed(node: &Node, instance: &Instance) -> Result<PubSub<SmoothedState>, TransportError> {
+    pub_sub(node, instance, Topic::Smoothed)
 }
 
 /// Opens the health of an instance.

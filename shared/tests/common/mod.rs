@@ -30,6 +30,7 @@ macro_rules! for_every_message {
         $check::<StateVector>();
         $check::<ControlRequest>();
         $check::<ControlResponse>();
+        $check::<SmoothedState>();
     }};
 }
 

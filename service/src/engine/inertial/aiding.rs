@@ -5,6 +5,8 @@ use inekf::model::{
     HeadingObservation, InertialState, Observation, PositionObservation, VelocityObservation,
 };
 
+use inekf::smoother;
+
 use super::super::fix::{Antenna, FixKind, Measurement};
 use super::super::model::Fused;
 use super::super::recovery::Widening;
@@ -53,6 +55,15 @@ impl Measurement for Aiding {
 }
 
 impl Aiding {
+    /// The same for the window of a smoother, which knows no heading.
+    pub fn for_window(&self) -> Option<smoother::Fix> {
+        match self {
+            Self::Position(observation) => Some((*observation).into()),
+            Self::Velocity(observation) => Some((*observation).into()),
+            Self::Heading(_) => None,
+        }
+    }
+
     /// Corrects `belief`.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 use inekf::filter::{Alignment, Belief, InertialSide, Levelled, UpdateError, propagate_in_place};
 use inekf::lie::SO3;
 use inekf::model::{ImuInput, ImuNoise, InertialState};
+use inekf::smoother::Preintegration;
 use inekf_shared::message::{
     EstimateSe23, HeadingFix, INPUT_IMU, ImuSample, MODEL_IMU, PositionFix, StateVector,
     VelocityFix, Zero,
@@ -55,7 +56,8 @@ pub struct ImuMotion {
 }
 
 impl<G: InertialState<D>, S: InertialSide, const D: usize> Inertial<G, S, D> {
-    fn new(settings: &Settings) -> Self {
+    /// The model that `settings` describe.
+    pub(super) fn new(settings: &Settings) -> Self {
         let window_ns = match settings.initial.level {
             LevelSource::Accelerometer { window_ns } => window_ns,
             LevelSource::Given { .. } => 0,
@@ -67,6 +69,22 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Inertial<G, S, D> {
             levelling: Levelling::new(window_ns),
             filter: core::marker::PhantomData,
         }
+    }
+
+    /// Adds the next `part_ns` nanoseconds of a motion to those of `whole`.
+    pub(super) fn integrate(
+        &self,
+        whole: &mut Preintegration<G, D>,
+        motion: &ImuMotion,
+        part_ns: u64,
+    ) {
+        whole.push(
+            &motion.held,
+            &self.imu.g_w,
+            seconds(part_ns),
+            self.imu.discretisation,
+            &motion.noise,
+        );
     }
 
     /// The input that speaks for an interval. Over a gap neither end does: their mean is the best

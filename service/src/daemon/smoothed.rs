@@ -1,0 +1,71 @@
+//! Where smoothed states leave: those that the window is done with, and the whole window on request.
+//!
+//! Everything here runs after an estimate has been published, never before.
+
+use inekf_shared::message::SmoothedState;
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::{self, Node, Publisher, TransportError};
+
+use crate::engine::{Engine, History, Model};
+
+/// The topic, if the estimator is a smoother.
+#[derive(Debug)]
+pub struct SmoothedPort {
+    publisher: Option<Publisher<SmoothedState>>,
+    /// States that could not be published; the watch reports them.
+    pub failures: u64,
+}
+
+impl SmoothedPort {
+    /// Opens the topic for a daemon that `smooths`.
+    ///
+    /// # Errors
+    /// [`TransportError`], naming the service and the remedy.
+    pub fn open(node: &Node, instance: &Instance, smooths: bool) -> Result<Self, TransportError> {
+        let publisher = match smooths {
+            true => Some(transport::smoothed(node, instance)?.publisher()?),
+            false => None,
+        };
+        Ok(Self {
+            publisher,
+            failures: 0,
+        })
+    }
+
+    fn publish(&mut self, state: SmoothedState) {
+        let Some(publisher) = &self.publisher else {
+            return;
+        };
+        let sent = publisher
+            .loan_uninit()
+            .is_ok_and(|slot| slot.write_payload(state).send().is_ok());
+        if !sent {
+            self.failures += 1;
+        }
+    }
+
+    /// Publishes the states that have left the window.
+    pub fn publish_left<M: Model, H: History<M>>(&mut self, engine: &mut Engine<M, H>) {
+        while let Some(state) = engine.take_left() {
+            self.publish(state);
+        }
+    }
+
+    /// Publishes the states in the window under `request_id`, and says how many they are.
+    ///
+    /// # Errors
+    /// A sentence that says why there are none.
+    pub fn answer<M: Model, H: History<M>>(
+        &mut self,
+        engine: &Engine<M, H>,
+        request_id: u64,
+    ) -> Result<u64, &'static str> {
+        let count = engine.smoothed(&mut |state| {
+            self.publish(SmoothedState {
+                request_id,
+                ..*state
+            });
+        })?;
+        Ok(count as u64)
+    }
+}

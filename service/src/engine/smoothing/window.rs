@@ -1,0 +1,81 @@
+//! The window of any parametrisation behind one face, so that there is one engine for all of them.
+
+use core::fmt::Debug;
+
+use inekf::filter::{Belief, Covariance, Forster, Gtsam, Left, Right, Side};
+use inekf::lie::{LieGroup, SE23};
+use inekf::model::InertialState;
+use inekf::smoother::{Fix, Preintegration, Window, WindowCorrection, WindowError, WindowOptions};
+use nalgebra::{SVector, Vector3};
+
+use super::super::settings::SmootherSettings;
+use crate::config::Parametrisation;
+
+/// A [`Window`] of some parametrisation; its methods say what these do.
+pub trait AnyWindow<G, const D: usize>: Debug {
+    /// [`Window::restart`].
+    fn restart(&mut self, first: &Belief<G, Left, D>);
+
+    /// [`Window::push`].
+    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G>;
+
+    /// [`Window::update`].
+    ///
+    /// # Errors
+    /// As there.
+    fn update(&mut self, fix: Fix) -> Result<WindowCorrection, WindowError>;
+
+    /// [`Window::newest`].
+    fn newest(&self) -> Belief<G, Left, D>;
+
+    /// Hands over [`Window::states`].
+    fn each(&self, give: &mut dyn FnMut(&G));
+}
+
+impl<G: InertialState<D>, S: Side, const D: usize> AnyWindow<G, D> for Window<G, S, D> {
+    fn restart(&mut self, first: &Belief<G, Left, D>) {
+        Self::restart(self, first);
+    }
+
+    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
+        Self::push(self, motion)
+    }
+
+    fn update(&mut self, fix: Fix) -> Result<WindowCorrection, WindowError> {
+        Self::update(self, fix)
+    }
+
+    fn newest(&self) -> Belief<G, Left, D> {
+        Self::newest(self)
+    }
+
+    fn each(&self, give: &mut dyn FnMut(&G)) {
+        self.states().for_each(give);
+    }
+}
+
+/// What is believed before there is a state: it holds the place, and is never published.
+pub(super) fn nowhere<G: InertialState<D>, const D: usize>() -> Belief<G, Left, D> {
+    Belief::new(
+        G::from_parts(SE23::identity(), Vector3::zeros(), Vector3::zeros()),
+        Covariance::from_variances(&SVector::zeros()),
+    )
+}
+
+/// The window that `settings` ask for, with all the memory it will ever use.
+pub fn of<G: InertialState<D> + 'static, const D: usize>(
+    settings: &SmootherSettings,
+) -> Box<dyn AnyWindow<G, D>> {
+    fn sided<G: InertialState<D> + 'static, S: Side + 'static, const D: usize>(
+        options: &WindowOptions,
+    ) -> Box<dyn AnyWindow<G, D>> {
+        Box::new(Window::<G, S, D>::new(&nowhere(), options))
+    }
+    let options = &settings.window;
+    match settings.parametrisation {
+        Parametrisation::Exponential => sided::<G, Left, D>(options),
+        Parametrisation::Right => sided::<G, Right, D>(options),
+        Parametrisation::Gtsam => sided::<G, Gtsam, D>(options),
+        Parametrisation::Forster => sided::<G, Forster, D>(options),
+    }
+}

@@ -60,6 +60,12 @@ impl SmoothedPort {
         engine: &Engine<M, H>,
         request_id: u64,
     ) -> Result<u64, &'static str> {
+        if request_id == 0 {
+            return Err(
+                "a request for the smoothed states needs an id other than 0, which marks those that \
+                 have left the window",
+            );
+        }
         let count = engine.smoothed(&mut |state| {
             self.publish(SmoothedState {
                 request_id,

@@ -9,7 +9,11 @@ use crate::common::{
 use crate::{Fed, Full, full, smoothing};
 
 fn started() -> Full {
-    let mut engine = full(smoothing("", 5, ""));
+    started_with("")
+}
+
+fn started_with(top: &str) -> Full {
+    let mut engine = full(smoothing(top, 5, ""));
     engine.set_state(&state_on_circle(stamp(0), 0.3)).unwrap();
     engine
 }
@@ -45,11 +49,17 @@ fn a_late_fix_gives_the_bits_that_it_would_have_given_on_time() {
     drive(&mut on_time, 0);
     let counters = on_time.tally().counters;
     assert!(counters.accepted >= 8 && counters.late == 0, "{counters:?}");
-    for late in [1, 2, 17, 45] {
-        let mut engine = started();
+    for (late, hold) in [
+        (1, "hold = 'midpoint'"),
+        (2, "hold = 'forward'"),
+        (17, ""),
+        (45, ""),
+        (45, "hold = 'midpoint'"),
+    ] {
+        let mut engine = started_with(hold);
         let estimates = drive(&mut engine, late);
         // The fixes of the last samples have not come.
-        let mut expected = started();
+        let mut expected = started_with(hold);
         let mut outbox = Vec::new();
         for k in 0..=300_u64 {
             if k > 0 && k.is_multiple_of(50) && k + late <= 300 {

@@ -103,7 +103,7 @@ a ping-pong as disturbed. In the JSON `ratio_p50` and `ratio_p999` on top are th
 filter by the plain echo, both spinning at saturation.
 
   inekf-bench latency --json latency.json --svg latency.svg
-  inekf-bench latency --rounds 1000000 --turns 20 --seconds 10     # an hour's calm, for the tails
+  inekf-bench latency --rounds 1000000 --turns 20 --seconds 10     # a quarter of an hour, for the tails
 ";
 
 fn main() -> ExitCode {

@@ -55,7 +55,7 @@ pub struct LatencyOptions {
     #[arg(long, default_value_t = 4)]
     pub turns: u64,
     /// Length of each paced row, seconds, all turns together. At 200 Hz the default is 60 rounds:
-    /// enough for a median; for p99.9 take 100.
+    /// enough for a median; for p99.9 take 60.
     #[arg(long, default_value_t = 0.3)]
     pub seconds: f64,
     /// The two processors are threads of one core if the median of the raw cache-line ping-pong is

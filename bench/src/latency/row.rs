@@ -236,7 +236,7 @@ mod tests {
         }
     }
 
-    fn row(chunks: &[Chunk]) -> Row {
+    fn row(chunks: &[&Chunk]) -> Row {
         let case = Case {
             mechanism: Mechanism::Echo,
             wait: Wait::Spin,
@@ -252,7 +252,7 @@ mod tests {
     #[test]
     fn chunks_add_up_and_mixed_ones_are_left_out() {
         let quiet = chunk(&[(1000, 100)], &[(100, 100)]);
-        let mut row = row(&[quiet.clone(), quiet.clone(), quiet.clone()]);
+        let mut row = row(&[&quiet; 3]);
         row.add(None, &quiet).expect("same bounds");
         assert_eq!(row.mixed, 1);
         assert!(row.at(Placement::SiblingThreads).is_none());
@@ -264,22 +264,22 @@ mod tests {
 
     #[test]
     fn noise_is_told_by_its_cause() {
-        let noise = |chunks: &[Chunk], quantile| {
+        let noise = |chunks: &[&Chunk], quantile| {
             let row = row(chunks);
             let at = row.at(Placement::SeparateCores);
             at.and_then(|at| at.noise(quantile, false))
         };
         let quiet = chunk(&[(1000, 990), (3000, 10)], &[(100, 1000)]);
-        assert_eq!(noise(&[quiet.clone()], MEDIAN), None);
-        assert_eq!(noise(&[quiet.clone()], 0.99), None);
+        assert_eq!(noise(&[&quiet], MEDIAN), None);
+        assert_eq!(noise(&[&quiet], 0.99), None);
         // One of 1000 rounds lies beyond.
-        assert_eq!(noise(&[quiet.clone()], P999), Some(Noise::FewRounds));
+        assert_eq!(noise(&[&quiet], P999), Some(Noise::FewRounds));
         let slow = chunk(&[(2000, 1000)], &[(100, 1000)]);
-        let chunks = [quiet.clone(), slow.clone(), quiet, slow];
+        let chunks = [&quiet, &slow, &quiet, &slow];
         assert_eq!(noise(&chunks, MEDIAN), Some(Noise::Varies));
         // The cache line is as slow as the rounds, because both are interrupted.
         let interrupted = chunk(&[(1000, 980), (5000, 20)], &[(100, 980), (4000, 20)]);
-        assert_eq!(noise(&[interrupted.clone()], 0.99), Some(Noise::Disturbed));
-        assert_eq!(noise(&[interrupted], MEDIAN), None);
+        assert_eq!(noise(&[&interrupted], 0.99), Some(Noise::Disturbed));
+        assert_eq!(noise(&[&interrupted], MEDIAN), None);
     }
 }

@@ -98,9 +98,11 @@ one core and two cores; a ping-pong of a cache line before and after every chunk
 which, rows are kept apart by it, and a chunk in which it changed is left out. So compare ratios:
   / line   median by that of the ping-pongs around the same chunk
   / echo   median by that of the plain echo in the same group
-A figure with ~ is dominated by noise: fewer than ten rounds beyond it, or chunks that disagree, or
-a ping-pong as disturbed. In the JSON `ratio_p50` and `ratio_p999` on top are those of the 15-state
-filter by the plain echo, both spinning at saturation.
+A figure with ~ is dominated by noise: fewer than ten rounds beyond it, or other processes that took
+a processor about as often, or chunks that disagree, or a ping-pong as disturbed.
+
+In the JSON `ratio_p50` and `ratio_p999` on top are those of the 15-state filter by the plain echo,
+both spinning at saturation.
 
   inekf-bench latency --json latency.json --svg latency.svg
   inekf-bench latency --rounds 1000000 --turns 20 --seconds 10     # a quarter of an hour, for the tails

@@ -12,7 +12,7 @@ use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, LatestReader, LatestWriter, Node};
 
 use super::mechanism::{Mechanism, Wait};
-use super::partner::{self, PATIENCE, Partner, RoundTrip, STOP, end_with_parent, still_patient};
+use super::partner::{PATIENCE, Partner, RoundTrip, STOP, end_with_parent, still_patient};
 use crate::pin;
 
 /// A process that answers what it finds in its slot, and the slots of both sides.
@@ -75,12 +75,8 @@ impl RoundTrip for Blackboard {
         Ok(monotonic_ns() - sent_ns)
     }
 
-    fn pause(&mut self) -> anyhow::Result<()> {
-        partner::pause(self.partner.id())
-    }
-
-    fn resume(&mut self) -> anyhow::Result<()> {
-        partner::resume(self.partner.id())
+    fn process(&self) -> Option<u32> {
+        Some(self.partner.id())
     }
 }
 

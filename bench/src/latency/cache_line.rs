@@ -79,6 +79,10 @@ impl RoundTrip for CacheLine {
         Ok(monotonic_ns() - sent_ns)
     }
 
+    fn process(&self) -> Option<u32> {
+        None
+    }
+
     fn pause(&mut self) -> anyhow::Result<()> {
         self.stop_partner();
         Ok(())

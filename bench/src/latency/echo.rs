@@ -16,7 +16,7 @@ use inekf_shared::transport::{self, Node, Publisher, Subscriber, WakeNotifier};
 
 use super::mechanism::{Mechanism, Wait};
 use super::partner::{
-    self, LONGEST_SLEEP, PATIENCE, Partner, RoundTrip, STOP, end_with_parent, still_patient,
+    LONGEST_SLEEP, PATIENCE, Partner, RoundTrip, STOP, end_with_parent, still_patient,
 };
 use crate::pin;
 
@@ -135,12 +135,8 @@ impl RoundTrip for Echo {
         }
     }
 
-    fn pause(&mut self) -> anyhow::Result<()> {
-        partner::pause(self.partner.id())
-    }
-
-    fn resume(&mut self) -> anyhow::Result<()> {
-        partner::resume(self.partner.id())
+    fn process(&self) -> Option<u32> {
+        Some(self.partner.id())
     }
 }
 

@@ -14,7 +14,7 @@ use inekf_shared::message::{
 use tempfile::TempDir;
 
 use super::mechanism::Wait;
-use super::partner::{self, RoundTrip, still_patient};
+use super::partner::{RoundTrip, still_patient};
 use crate::pin;
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -175,11 +175,7 @@ impl<E: model::Estimate> RoundTrip for Estimate<E> {
         }
     }
 
-    fn pause(&mut self) -> anyhow::Result<()> {
-        partner::pause(self.daemon.id())
-    }
-
-    fn resume(&mut self) -> anyhow::Result<()> {
-        partner::resume(self.daemon.id())
+    fn process(&self) -> Option<u32> {
+        Some(self.daemon.id())
     }
 }

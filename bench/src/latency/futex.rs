@@ -80,13 +80,9 @@ impl RoundTrip for Futex {
         Ok(monotonic_ns() - sent_ns)
     }
 
-    // Between rounds the partner sleeps anyway.
-    fn pause(&mut self) -> anyhow::Result<()> {
-        Ok(())
-    }
-
-    fn resume(&mut self) -> anyhow::Result<()> {
-        Ok(())
+    /// A thread; between rounds it sleeps and needs no pause.
+    fn process(&self) -> Option<u32> {
+        None
     }
 }
 

@@ -18,6 +18,7 @@ pub mod machine;
 pub mod mechanism;
 pub mod partner;
 pub mod placement;
+pub mod preemption;
 pub mod report;
 pub mod row;
 pub mod socket;
@@ -120,10 +121,12 @@ fn measure_case(
         .with_context(|| format!("measuring {name}"))?;
     let mut before = ping_pong(&mut *partner, cpu)?;
     for row in rows {
+        let preempted = preemption::count(partner.process());
         let (rounds, missed) = match row.pace {
             Pace::Saturated => (saturated(&mut *partner, rounds_of(case.wait, options))?, 0),
             Pace::Hz(rate) => paced(&mut *partner, rate, options.seconds / options.turns as f64)?,
         };
+        let preempted = preemption::count(partner.process()).saturating_sub(preempted);
         let after = ping_pong(&mut *partner, cpu)?;
         let placement = Placement::between(&before, &after, options.sibling_below_ns);
         let mut pings = before;
@@ -131,6 +134,7 @@ fn measure_case(
         let chunk = Chunk {
             rounds,
             missed,
+            preempted,
             pings,
         };
         row.add(placement, &chunk)?;

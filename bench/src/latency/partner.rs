@@ -31,17 +31,25 @@ pub trait RoundTrip {
     /// The other side does not answer.
     fn round(&mut self) -> anyhow::Result<u64>;
 
-    /// Frees the partner's processor until [`RoundTrip::resume`].
+    /// The partner's process, if it is one.
+    fn process(&self) -> Option<u32>;
+
+    /// Frees the partner's processor until [`RoundTrip::resume`]. A partner that is no process frees
+    /// it in a way of its own.
     ///
     /// # Errors
     /// It cannot be stopped, or has gone.
-    fn pause(&mut self) -> anyhow::Result<()>;
+    fn pause(&mut self) -> anyhow::Result<()> {
+        self.process().map_or(Ok(()), pause)
+    }
 
     /// Goes on.
     ///
     /// # Errors
     /// It has gone.
-    fn resume(&mut self) -> anyhow::Result<()>;
+    fn resume(&mut self) -> anyhow::Result<()> {
+        self.process().map_or(Ok(()), resume)
+    }
 }
 
 /// Fails once a round that began at `sent_ns` has taken too long.
@@ -120,7 +128,7 @@ pub fn end_with_parent() -> anyhow::Result<()> {
 ///
 /// # Errors
 /// It has gone.
-pub fn pause(id: u32) -> anyhow::Result<()> {
+fn pause(id: u32) -> anyhow::Result<()> {
     let pid = pid(id)?;
     kill_process(pid, Signal::STOP).context("pausing the partner process")?;
     // NOWAIT leaves the news of its end to whoever owns the process.
@@ -136,7 +144,7 @@ pub fn pause(id: u32) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// It has gone.
-pub fn resume(id: u32) -> anyhow::Result<()> {
+fn resume(id: u32) -> anyhow::Result<()> {
     kill_process(pid(id)?, Signal::CONT).context("resuming the partner process")
 }
 

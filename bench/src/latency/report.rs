@@ -228,6 +228,7 @@ impl Report {
             ("chunks".to_owned(), it.chunks().into()),
             ("count".to_owned(), it.rounds.len().into()),
             ("missed".to_owned(), it.missed.into()),
+            ("preempted".to_owned(), it.preempted.into()),
             ("noise".to_owned(), noise.into()),
             ("ratio_p50".to_owned(), ratio(MEDIAN).into()),
             ("ratio_p999".to_owned(), ratio(P999).into()),

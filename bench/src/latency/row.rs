@@ -43,6 +43,8 @@ pub struct Chunk {
     pub rounds: Histogram<u64>,
     /// Times at which a round should have begun, but one was still under way.
     pub missed: u64,
+    /// How often others took a processor from one of the two sides.
+    pub preempted: u64,
     /// Both ping-pongs, together.
     pub pings: Histogram<u64>,
 }
@@ -52,6 +54,8 @@ pub struct Chunk {
 pub enum Noise {
     /// Fewer than ten rounds were slower.
     FewRounds,
+    /// Others took the processor at least half as often as a round was slower.
+    Preempted,
     /// The chunks disagree: their middle half spans more than a factor 1.5.
     Varies,
     /// The raw cache line, disturbed, takes half as long or longer at the same quantile.
@@ -63,6 +67,7 @@ impl Noise {
     pub fn name(self) -> &'static str {
         match self {
             Self::FewRounds => "few rounds beyond it",
+            Self::Preempted => "preempted as often",
             Self::Varies => "chunks disagree",
             Self::Disturbed => "raw cache line as disturbed",
         }
@@ -78,6 +83,8 @@ pub struct Distribution {
     pub pings: Histogram<u64>,
     /// Times that were missed.
     pub missed: u64,
+    /// How often others took a processor from one of the two sides.
+    pub preempted: u64,
     /// Of each chunk: the figures, in the order of [`FIGURES`].
     chunks: Vec<[u64; FIGURES.len()]>,
     /// Of each chunk: its median by that of its own ping-pongs.
@@ -90,6 +97,7 @@ impl Distribution {
             rounds: histogram()?,
             pings: histogram()?,
             missed: 0,
+            preempted: 0,
             chunks: Vec::new(),
             ratios: Vec::new(),
         })
@@ -99,6 +107,7 @@ impl Distribution {
         self.rounds.add(&chunk.rounds)?;
         self.pings.add(&chunk.pings)?;
         self.missed += chunk.missed;
+        self.preempted += chunk.preempted;
         let figures = FIGURES.map(|(_, quantile)| chunk.rounds.value_at_quantile(quantile));
         self.chunks.push(figures);
         let raw = chunk.pings.value_at_quantile(MEDIAN).max(1);
@@ -133,6 +142,9 @@ impl Distribution {
         let beyond = |histogram: &Histogram<u64>| histogram.len() as f64 * (1.0 - quantile);
         if beyond(&self.rounds) < ROUNDS_BEYOND {
             return Some(Noise::FewRounds);
+        }
+        if 2.0 * self.preempted as f64 >= beyond(&self.rounds) {
+            return Some(Noise::Preempted);
         }
         let index = FIGURES.iter().position(|(_, known)| *known == quantile);
         if index.is_some_and(|index| self.spread(index) > SPREAD) {
@@ -232,6 +244,7 @@ mod tests {
         Chunk {
             rounds: of(rounds),
             missed: 1,
+            preempted: 2,
             pings: of(pings),
         }
     }
@@ -257,7 +270,8 @@ mod tests {
         assert_eq!(row.mixed, 1);
         assert!(row.at(Placement::SiblingThreads).is_none());
         let at = row.at(Placement::SeparateCores).expect("three chunks");
-        assert_eq!((at.chunks(), at.rounds.len(), at.missed), (3, 300, 3));
+        assert_eq!((at.chunks(), at.rounds.len()), (3, 300));
+        assert_eq!((at.missed, at.preempted), (3, 6));
         assert_eq!(at.figure(MEDIAN), 1000);
         assert_eq!(at.ratio_to_raw(), 10.0);
     }
@@ -281,5 +295,12 @@ mod tests {
         let interrupted = chunk(&[(1000, 980), (5000, 20)], &[(100, 980), (4000, 20)]);
         assert_eq!(noise(&[&interrupted], 0.99), Some(Noise::Disturbed));
         assert_eq!(noise(&[&interrupted], MEDIAN), None);
+        // Others had the processor five times, and ten rounds are slower.
+        let preempted = Chunk {
+            preempted: 5,
+            ..interrupted.clone()
+        };
+        assert_eq!(noise(&[&preempted], 0.99), Some(Noise::Preempted));
+        assert_eq!(noise(&[&preempted], MEDIAN), None);
     }
 }

@@ -14,7 +14,7 @@ use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{EstimateSe23, ImuSample};
 
 use super::mechanism::{Mechanism, Wait};
-use super::partner::{self, Partner, RoundTrip, STOP, end_with_parent, still_patient};
+use super::partner::{Partner, RoundTrip, STOP, end_with_parent, still_patient};
 use crate::pin;
 
 /// How long one blocking receive may take; then it is looked whether there is still hope.
@@ -110,12 +110,8 @@ impl RoundTrip for Socket {
         Ok(monotonic_ns() - sent_ns)
     }
 
-    fn pause(&mut self) -> anyhow::Result<()> {
-        partner::pause(self.partner.id())
-    }
-
-    fn resume(&mut self) -> anyhow::Result<()> {
-        partner::resume(self.partner.id())
+    fn process(&self) -> Option<u32> {
+        Some(self.partner.id())
     }
 }
 

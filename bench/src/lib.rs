@@ -6,3 +6,4 @@
 pub mod experiment;
 pub mod latency;
 pub mod pin;
+mod progress;

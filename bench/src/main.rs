@@ -1,14 +1,15 @@
 //! `inekf-bench`: measures the estimation service, and repeats the papers' experiments.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 use inekf_bench::experiment::section7::{MismatchLaw, Setup};
 use inekf_bench::experiment::{self, Experiment, Prior};
-use inekf_bench::latency::{LatencyOptions, echo, measure, report};
+use inekf_bench::latency::mechanism::{self, Mechanism, Wait};
+use inekf_bench::latency::{LatencyOptions, figure, measure};
 use inekf_shared::topic::Instance;
 
 /// Measures the estimation service, and repeats the papers' experiments. Build everything first: `cargo build --release`.
@@ -21,18 +22,18 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Round trips from an IMU sample to its estimate between two processes, beside a plain
-    /// iceoryx2 echo and a raw cache-line ping-pong.
+    /// Round trips from a sample to its estimate with full covariance between two pinned processes,
+    /// beside what else one could do: iceoryx2 echo, blackboard, sockets, a raw cache line.
+    #[command(after_long_help = READING)]
     Latency {
-        /// Round trips per row.
-        #[arg(long, default_value_t = 200_000)]
-        rounds: u64,
-        /// Turns that the rows take.
-        #[arg(long, default_value_t = 10)]
-        turns: u64,
-        /// Write all rows and ratios as JSON.
+        #[command(flatten)]
+        options: LatencyOptions,
+        /// Write all rows, ratios, the machine and its load as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
+        /// Draw the distributions as an SVG figure.
+        #[arg(long, value_name = "FILE")]
+        svg: Option<PathBuf>,
     },
     /// An experiment of the papers: tables on standard output, CSV files and SVG figures in a folder.
     Experiment {
@@ -60,15 +61,52 @@ enum Command {
         #[arg(long, value_enum, value_name = "FORM")]
         prior: Option<Prior>,
     },
-    /// The partner process of the plain echo.
+    /// The partner process of a mechanism.
     #[command(hide = true)]
-    Echo {
+    Partner {
+        /// What it answers over.
+        mechanism: Mechanism,
+        /// How it waits.
+        wait: Wait,
         /// Instance to serve.
         instance: String,
         /// Processor to run on.
         cpu: usize,
     },
 }
+
+/// How to read what `latency` prints.
+const READING: &str = "\
+What is measured, in nanoseconds, from before the sample is sent until its answer is read:
+  estimate, 15 / 9 states     IMU sample to a real daemon, estimate with full covariance back
+  LC-InEKF, odometry2d        planar odometry to its estimate; + fix: with a position fix beside it,
+                              to the estimate that holds both
+  plain iceoryx2 echo         what shared memory alone costs with the same messages
+  pre-loaned iceoryx2 echo    the same with slots loaned ahead
+  iceoryx2 blackboard         a newest-value slot in each direction
+  Unix-domain, UDP socket     datagrams as long as those messages
+  raw cache line, raw futex   the floor of what spins, and of what is woken
+
+spin: the far side looks all the time. event: it sleeps until woken, while this side still spins for
+the answer (sockets block on both sides). At saturation the next round begins at once, often before
+the far side has gone to sleep: what a wake-up costs shows at fixed times. Times that pass during a
+round are left out, and counted in the JSON as `missed`.
+
+Two processors are used for as long as it runs, 40 to 60 s by default. Leave the machine alone
+meanwhile: its load stands in the report. A virtual machine's processors move between the threads of
+one core and two cores; a ping-pong of a cache line before and after every chunk of rounds tells
+which, rows are kept apart by it, and a chunk in which it changed is left out. So compare ratios:
+  / line   median by that of the ping-pongs around the same chunk
+  / echo   median by that of the plain echo in the same group
+A figure with ~ is dominated by noise: fewer than ten rounds beyond it, or other processes that took
+a processor about as often, or chunks that disagree, or a ping-pong as disturbed.
+
+In the JSON `ratio_p50` and `ratio_p999` on top are those of the 15-state filter by the plain echo,
+both spinning at saturation.
+
+  inekf-bench latency --json latency.json --svg latency.svg
+  inekf-bench latency --rounds 1000000 --turns 20 --seconds 10     # a quarter of an hour, for the tails
+";
 
 fn main() -> ExitCode {
     match run(Arguments::parse().command) {
@@ -82,7 +120,12 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<()> {
     match command {
-        Command::Echo { instance, cpu } => echo::serve(&Instance::new(&instance)?, cpu),
+        Command::Partner {
+            mechanism,
+            wait,
+            instance,
+            cpu,
+        } => mechanism::serve(mechanism, wait, &Instance::new(&instance)?, cpu),
         Command::Experiment {
             name,
             out,
@@ -110,22 +153,20 @@ fn run(command: Command) -> anyhow::Result<()> {
             writeln!(stdout, "\nwritten to {}", out.display())?;
             Ok(())
         }
-        Command::Latency {
-            rounds,
-            turns,
-            json,
-        } => {
-            let rows = measure(&LatencyOptions {
-                rounds,
-                turns: turns.max(1),
-            })?;
-            print!("{}", report::text(&rows));
+        Command::Latency { options, json, svg } => {
+            let report = measure(&options)?;
+            std::io::stdout().write_all(report.text().as_bytes())?;
             if let Some(file) = json {
-                let text = serde_json::to_string_pretty(&report::json(&rows))?;
-                std::fs::write(&file, text)
-                    .with_context(|| format!("writing {}", file.display()))?;
+                write(&file, &serde_json::to_string_pretty(&report.json())?)?;
+            }
+            if let Some(file) = svg {
+                write(&file, &figure::svg(&report)?)?;
             }
             Ok(())
         }
     }
+}
+
+fn write(file: &Path, text: &str) -> anyhow::Result<()> {
+    std::fs::write(file, text).with_context(|| format!("writing {}", file.display()))
 }

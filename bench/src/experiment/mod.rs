@@ -21,9 +21,9 @@ use std::path::Path;
 
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
 use inekf::smoother::PriorForm;
 
+use crate::progress::progress;
 use section7::{DURATION_S, Setup};
 
 /// Which experiment.
@@ -148,15 +148,4 @@ pub fn run(experiment: Experiment, options: &Options, out: &Path) -> anyhow::Res
 fn write(out: &Path, name: &str, text: &str) -> anyhow::Result<()> {
     let file = out.join(name);
     std::fs::write(&file, text).with_context(|| format!("writing {}", file.display()))
-}
-
-/// A progress bar on standard error; silent where that is not a terminal.
-fn progress(what: &'static str, steps: u64) -> ProgressBar {
-    let bar = ProgressBar::new(steps);
-    let style = "{msg} {bar:40} {pos}/{len} runs  {elapsed} / {duration}";
-    if let Ok(style) = ProgressStyle::with_template(style) {
-        bar.set_style(style);
-    }
-    bar.set_message(what);
-    bar
 }

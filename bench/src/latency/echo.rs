@@ -1,30 +1,73 @@
-//! What shared memory alone costs: a plain iceoryx2 echo with the service's own payload sizes,
-//! loaned at send as iceoryx2's own examples do.
+//! What shared memory alone costs: an iceoryx2 echo with the service's own messages, an `ImuSample`
+//! there and an `EstimateSe23` back; slots loaned at send as iceoryx2's own examples do, or ahead.
 
-use std::process::{Child, Command, Stdio};
+use std::mem::MaybeUninit;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::bail;
+use iceoryx2::prelude::ipc;
+use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use inekf_client::daemon::private_instance;
 use inekf_shared::clock::monotonic_ns;
-use inekf_shared::message::{EstimateSe23, ImuSample, Zero};
+use inekf_shared::message::{EstimateSe23, ImuSample, Message, Zero};
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Publisher, Subscriber};
+use inekf_shared::transport::{self, Node, Publisher, Subscriber, WakeNotifier};
 
-use super::RoundTrip;
+use super::mechanism::{Mechanism, Wait};
+use super::partner::{
+    LONGEST_SLEEP, PATIENCE, Partner, RoundTrip, STOP, end_with_parent, still_patient,
+};
 use crate::pin;
 
-/// Name of the row.
-pub const NAME: &str = "plain iceoryx2 echo";
-/// How long the partner may take for one answer.
-const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+/// A publisher, with a slot loaned ahead if asked for.
+struct Outlet<M: Message> {
+    publisher: Publisher<M>,
+    is_ahead: bool,
+    ahead: Option<SampleMutUninit<ipc::Service, MaybeUninit<M>, ()>>,
+}
+
+impl<M: Message> Outlet<M> {
+    fn new(publisher: Publisher<M>, is_ahead: bool) -> anyhow::Result<Self> {
+        let mut outlet = Self {
+            publisher,
+            is_ahead,
+            ahead: None,
+        };
+        outlet.loan_ahead()?;
+        Ok(outlet)
+    }
+
+    /// Returns the number of receivers.
+    fn send(&mut self, message: M) -> anyhow::Result<usize> {
+        let slot = match self.ahead.take() {
+            Some(slot) => slot,
+            None => self.publisher.loan_uninit()?,
+        };
+        Ok(slot.write_payload(message).send()?)
+    }
+
+    /// Loans the next slot, away from the path of a message.
+    fn loan_ahead(&mut self) -> anyhow::Result<()> {
+        if self.is_ahead && self.ahead.is_none() {
+            self.ahead = Some(self.publisher.loan_uninit()?);
+        }
+        Ok(())
+    }
+}
+
+fn is_ahead(mechanism: Mechanism) -> bool {
+    mechanism == Mechanism::PreLoanedEcho
+}
 
 /// An echo process, and the ports to it.
 pub struct Echo {
-    partner: Child,
-    samples: Publisher<ImuSample>,
+    samples: Outlet<ImuSample>,
     answers: Subscriber<EstimateSe23>,
+    wake: Option<WakeNotifier>,
     next: u64,
+    partner: Partner,
+    _node: Node,
 }
 
 impl Echo {
@@ -32,79 +75,76 @@ impl Echo {
     ///
     /// # Errors
     /// It cannot be started, or does not answer.
-    pub fn start(cpu: usize) -> anyhow::Result<Self> {
+    pub fn start(mechanism: Mechanism, wait: Wait, cpu: usize) -> anyhow::Result<Self> {
         let instance = private_instance("echo")?;
         let node = transport::open_node("inekf-bench")?;
         let samples = transport::input::<ImuSample>(&node, &instance)?.publisher()?;
         let answers = transport::estimate::<EstimateSe23>(&node, &instance)?.subscriber()?;
-        let partner = Command::new(std::env::current_exe()?)
-            .args(["echo", instance.as_str(), &cpu.to_string()])
-            .stdin(Stdio::null())
-            .spawn()
-            .context("starting the echo process")?;
+        let wake = match wait {
+            Wait::Spin => None,
+            Wait::Event => Some(transport::wake(&node, &instance)?.notifier()?),
+        };
+        let partner = Partner::start(mechanism, wait, instance.as_str(), cpu, Stdio::null())?;
         let mut echo = Self {
-            partner,
-            samples,
+            samples: Outlet::new(samples, is_ahead(mechanism))?,
             answers,
+            wake,
             next: 1,
+            partner,
+            _node: node,
         };
         let started = Instant::now();
-        while echo.send()? == 0 {
-            if started.elapsed() > ANSWER_WITHIN {
+        while echo.send(1)? == 0 {
+            if started.elapsed() > PATIENCE {
                 bail!("the echo process does not listen");
             }
             std::thread::sleep(Duration::from_millis(1));
         }
+        echo.samples.loan_ahead()?;
         Ok(echo)
     }
 
-    fn send(&mut self) -> anyhow::Result<usize> {
+    fn send(&mut self, seq: u64) -> anyhow::Result<usize> {
         let mut sample = ImuSample::ZERO;
-        sample.header.seq = self.next;
-        Ok(self.samples.loan_uninit()?.write_payload(sample).send()?)
+        sample.header.seq = seq;
+        let receivers = self.samples.send(sample)?;
+        if let Some(wake) = &self.wake {
+            // A partner that cannot be woken looks by itself.
+            let _ = wake.notify();
+        }
+        Ok(receivers)
     }
 }
 
 impl RoundTrip for Echo {
-    fn name(&self) -> &'static str {
-        NAME
-    }
-
     fn round(&mut self) -> anyhow::Result<u64> {
         self.next += 1;
         let sent_ns = monotonic_ns();
-        self.send()?;
+        self.send(self.next)?;
         loop {
             // Answers to the start's own sends may still be on their way.
             if let Some(answer) = self.answers.receive()?
                 && answer.head.seq == self.next
             {
-                return Ok(monotonic_ns() - sent_ns);
+                let round_ns = monotonic_ns() - sent_ns;
+                self.samples.loan_ahead()?;
+                return Ok(round_ns);
             }
-            if monotonic_ns() - sent_ns > 5_000_000_000 {
-                bail!("the echo process does not answer");
-            }
+            still_patient(sent_ns, "the echo process")?;
             std::hint::spin_loop();
         }
+    }
+
+    fn process(&self) -> Option<u32> {
+        Some(self.partner.id())
     }
 }
 
 impl Drop for Echo {
     fn drop(&mut self) {
-        let mut stop = ImuSample::ZERO;
-        stop.header.seq = u64::MAX;
-        if let Ok(slot) = self.samples.loan_uninit() {
-            let _ = slot.write_payload(stop).send();
+        if self.send(STOP).is_ok() {
+            self.partner.await_end();
         }
-        let started = Instant::now();
-        while started.elapsed() < ANSWER_WITHIN {
-            if !matches!(self.partner.try_wait(), Ok(None)) {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        let _ = self.partner.kill();
-        let _ = self.partner.wait();
     }
 }
 
@@ -112,21 +152,36 @@ impl Drop for Echo {
 ///
 /// # Errors
 /// A port fails.
-pub fn serve(instance: &Instance, cpu: usize) -> anyhow::Result<()> {
+pub fn serve(
+    mechanism: Mechanism,
+    wait: Wait,
+    instance: &Instance,
+    cpu: usize,
+) -> anyhow::Result<()> {
+    end_with_parent()?;
     pin::pin(None, cpu)?;
     let node = transport::open_node("inekf-echo")?;
     let answers = transport::estimate::<EstimateSe23>(&node, instance)?.publisher()?;
+    let mut answers = Outlet::new(answers, is_ahead(mechanism))?;
+    let listener = match wait {
+        Wait::Spin => None,
+        Wait::Event => Some(transport::wake(&node, instance)?.listener()?),
+    };
     let samples = transport::input::<ImuSample>(&node, instance)?.subscriber()?;
     loop {
         let Some(sample) = samples.receive()? else {
-            std::hint::spin_loop();
+            match &listener {
+                None => std::hint::spin_loop(),
+                Some(listener) => drop(listener.wait(LONGEST_SLEEP)?),
+            }
             continue;
         };
-        if sample.header.seq == u64::MAX {
+        if sample.header.seq == STOP {
             return Ok(());
         }
         let mut answer = EstimateSe23::ZERO;
         answer.head.seq = sample.header.seq;
-        answers.loan_uninit()?.write_payload(answer).send()?;
+        answers.send(answer)?;
+        answers.loan_ahead()?;
     }
 }

@@ -1,78 +1,273 @@
-//! The rows as text and as JSON.
+//! The rows as text and as JSON. Ratios compare figures of one placement only.
 
-use hdrhistogram::Histogram;
+use std::fmt::Write;
+
 use inekf_client::plot::format_ns;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
-use super::{cache_line, echo};
+use super::LatencyOptions;
+use super::machine::Machine;
+use super::mechanism::{CASES, Case, Mechanism, PACES, Pace, Wait};
+use super::placement::{PLACEMENTS, Placement};
+use super::row::{Distribution, FIGURES, MEDIAN, P999, Row};
 
-/// One mechanism's round trips.
+/// What was measured.
 #[derive(Clone, Debug)]
-pub struct Row {
-    /// What was measured.
-    pub name: &'static str,
-    /// Round trips, ns.
-    pub histogram: Histogram<u64>,
+pub struct Report {
+    /// Every case at every pace.
+    pub rows: Vec<Row>,
+    /// On which machine.
+    pub machine: Machine,
+    /// With which options.
+    pub options: LatencyOptions,
 }
 
-const QUANTILES: [(&str, f64); 4] = [
-    ("p50", 0.5),
-    ("p99", 0.99),
-    ("p999", 0.999),
-    ("p9999", 0.9999),
-];
-
-/// The ratio of two rows at a quantile.
-fn ratio(row: &Row, base: Option<&Row>, quantile: f64) -> Option<f64> {
-    let base = base?.histogram.value_at_quantile(quantile);
-    (base > 0).then(|| row.histogram.value_at_quantile(quantile) as f64 / base as f64)
+/// The 15-state filter by the plain echo, both spinning at saturation.
+#[derive(Clone, Copy, Debug)]
+struct Headline {
+    placement: Placement,
+    p50: f64,
+    p999: f64,
+    /// Whether noise dominates a figure behind each.
+    is_noise: [bool; 2],
 }
 
-fn find<'a>(rows: &'a [Row], name: &str) -> Option<&'a Row> {
-    rows.iter().find(|row| row.name == name)
-}
-
-/// A table for people.
-pub fn text(rows: &[Row]) -> String {
-    let mut text = format!(
-        "{:<22}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}\n",
-        "round trip", "p50", "p99", "p99.9", "p99.99", "max", "p50 / echo"
-    );
-    let base = find(rows, echo::NAME);
-    for row in rows {
-        text += &format!("{:<22}", row.name);
-        for (_, quantile) in QUANTILES {
-            let ns = row.histogram.value_at_quantile(quantile);
-            text += &format!("{:>10}", format_ns(ns as f64));
-        }
-        text += &format!("{:>10}", format_ns(row.histogram.max() as f64));
-        let ratio = ratio(row, base, 0.5).map_or("-".to_owned(), |ratio| format!("{ratio:.2}"));
-        text += &format!("{ratio:>12}\n");
+impl Report {
+    fn row(&self, mechanism: Mechanism, wait: Wait, pace: Pace) -> Option<&Row> {
+        let case = Case { mechanism, wait };
+        let mut rows = self.rows.iter();
+        rows.find(|row| row.case == case && row.pace == pace)
     }
-    text
+
+    /// The plain echo that a row is compared with.
+    fn echo(&self, row: &Row, placement: Placement) -> Option<&Distribution> {
+        self.row(Mechanism::Echo, row.case.wait, row.pace)?
+            .at(placement)
+    }
+
+    /// The headline of each placement in which both were measured.
+    fn headlines(&self) -> Vec<(u64, Headline)> {
+        let in_placement = |placement| {
+            let filter = self.row(Mechanism::Filter15, Wait::Spin, Pace::Saturated)?;
+            let (ours, echo) = (filter.at(placement)?, self.echo(filter, placement)?);
+            let is_noise = |quantile| {
+                [ours, echo]
+                    .iter()
+                    .any(|it| it.noise(quantile, false).is_some())
+            };
+            let headline = Headline {
+                placement,
+                p50: ours.ratio_to(echo, MEDIAN),
+                p999: ours.ratio_to(echo, P999),
+                is_noise: [is_noise(MEDIAN), is_noise(P999)],
+            };
+            Some((ours.rounds.len().min(echo.rounds.len()), headline))
+        };
+        PLACEMENTS.into_iter().filter_map(in_placement).collect()
+    }
+
+    /// That of the placement with the most rounds.
+    fn headline(&self) -> Option<Headline> {
+        let most = self
+            .headlines()
+            .into_iter()
+            .max_by_key(|(rounds, _)| *rounds);
+        most.map(|(_, headline)| headline)
+    }
+
+    /// The placement in which most rounds at saturation were made.
+    pub fn main_placement(&self) -> Placement {
+        let rounds = |placement: &Placement| {
+            let saturated = self.rows.iter().filter(|row| row.pace == Pace::Saturated);
+            let of_row = |row: &Row| row.at(*placement).map_or(0, |it| it.rounds.len());
+            saturated.map(of_row).sum::<u64>()
+        };
+        let most = PLACEMENTS.into_iter().max_by_key(rounds);
+        most.unwrap_or(Placement::SeparateCores)
+    }
+
+    /// Chunks left out because the placement changed during them.
+    fn left_out(&self) -> usize {
+        self.rows.iter().map(|row| row.mixed).sum()
+    }
+
+    /// All chunks.
+    fn chunks(&self) -> usize {
+        let of_row = |row: &Row| {
+            let kept = PLACEMENTS
+                .into_iter()
+                .filter_map(|placement| row.at(placement));
+            row.mixed + kept.map(Distribution::chunks).sum::<usize>()
+        };
+        self.rows.iter().map(of_row).sum()
+    }
+
+    /// Tables for people.
+    pub fn text(&self) -> String {
+        let mut text = self.machine.text();
+        for wait in [Wait::Spin, Wait::Event] {
+            for pace in PACES {
+                for placement in PLACEMENTS {
+                    text += &self.table(wait, pace, placement);
+                }
+            }
+        }
+        let _ = write!(
+            text,
+            "\n{} of {} chunks left out: the placement of the processors changed during them.\n\
+             ~ noise dominates the figure (the JSON says why); the maximum is a single round.\n",
+            self.left_out(),
+            self.chunks(),
+        );
+        match self.headline() {
+            Some(headline) => {
+                let [p50, p999] = headline.is_noise.map(tilde);
+                let _ = writeln!(
+                    text,
+                    "estimate with 15 states by plain echo, {}: p50 {p50}{:.2}, p99.9 {p999}{:.2}",
+                    headline.placement.name(),
+                    headline.p50,
+                    headline.p999,
+                );
+            }
+            None => text += "no placement holds both the filter and the echo: take more turns\n",
+        }
+        text
+    }
+
+    /// One group of rows; empty if nothing was measured in it.
+    fn table(&self, wait: Wait, pace: Pace, placement: Placement) -> String {
+        let group = self
+            .rows
+            .iter()
+            .filter(|row| row.case.wait == wait && row.pace == pace);
+        let mut lines = String::new();
+        for row in group {
+            let Some(it) = row.at(placement) else {
+                continue;
+            };
+            let _ = write!(lines, "{:<28}", row.case.mechanism.name());
+            for (name, quantile) in FIGURES {
+                let is_marked = name != "max" && it.noise(quantile, row.is_raw()).is_some();
+                let figure = format_ns(it.figure(quantile) as f64);
+                let _ = write!(lines, "{:>10}", format!("{}{figure}", tilde(is_marked)));
+            }
+            let echo = self.echo(row, placement);
+            let by_echo = echo.map_or("-".to_owned(), |echo| {
+                format!("{:.2}", it.ratio_to(echo, MEDIAN))
+            });
+            let _ = writeln!(
+                lines,
+                "{:>9.1}{by_echo:>9}{:>9}",
+                it.ratio_to_raw(),
+                it.rounds.len()
+            );
+        }
+        if lines.is_empty() {
+            return lines;
+        }
+        let title = format!("{}, {}, {}", wait.name(), pace.name(), placement.name());
+        format!(
+            "\n{title}\n{:<28}{:>10}{:>10}{:>10}{:>10}{:>10}{:>9}{:>9}{:>9}\n{lines}",
+            "", "p50", "p99", "p99.9", "p99.99", "max", "/ line", "/ echo", "rounds"
+        )
+    }
+
+    /// Everything, for programs.
+    pub fn json(&self) -> Value {
+        let mut rows = Vec::new();
+        for row in &self.rows {
+            let places = PLACEMENTS.into_iter();
+            let found = places.filter_map(|place| Some((place, row.at(place)?)));
+            let values: Vec<Value> = found
+                .map(|(place, it)| self.row_json(row, place, it))
+                .collect();
+            if values.is_empty() {
+                rows.push(empty_json(row));
+            }
+            rows.extend(values);
+        }
+        let headline = self.headline();
+        let by_placement = self.headlines().into_iter().map(|(_, headline)| {
+            let ratios = json!({"ratio_p50": headline.p50, "ratio_p999": headline.p999});
+            (headline.placement.name().to_owned(), ratios)
+        });
+        json!({
+            "ratio_p50": headline.map(|headline| headline.p50),
+            "ratio_p999": headline.map(|headline| headline.p999),
+            "ratio_placement": headline.map(|headline| headline.placement.name()),
+            "ratio_p50_is_noise": headline.map(|headline| headline.is_noise[0]),
+            "ratio_p999_is_noise": headline.map(|headline| headline.is_noise[1]),
+            "ratio_by_placement": by_placement.collect::<Map<String, Value>>(),
+            "chunks": self.chunks(),
+            "chunks_left_out": self.left_out(),
+            "machine": self.machine.json(),
+            "options": {
+                "rounds": self.options.rounds,
+                "turns": self.options.turns,
+                "seconds": self.options.seconds,
+                "sibling_below_ns": self.options.sibling_below_ns,
+            },
+            "rows": rows,
+        })
+    }
+
+    fn row_json(&self, row: &Row, placement: Placement, it: &Distribution) -> Value {
+        let mut value = identity(row);
+        let echo = self.echo(row, placement);
+        let mut noise = Map::new();
+        for (name, quantile) in FIGURES {
+            value.insert(format!("{name}_ns"), it.figure(quantile).into());
+            if let Some(why) = it.noise(quantile, row.is_raw()) {
+                noise.insert(name.to_owned(), why.name().into());
+            }
+        }
+        let ratio = |quantile| echo.map(|echo| it.ratio_to(echo, quantile));
+        value.extend([
+            ("placement".to_owned(), placement.name().into()),
+            ("chunks".to_owned(), it.chunks().into()),
+            ("count".to_owned(), it.rounds.len().into()),
+            ("missed".to_owned(), it.missed.into()),
+            ("preempted".to_owned(), it.preempted.into()),
+            ("noise".to_owned(), noise.into()),
+            ("ratio_p50".to_owned(), ratio(MEDIAN).into()),
+            ("ratio_p999".to_owned(), ratio(P999).into()),
+            ("ratio_p50_cache_line".to_owned(), it.ratio_to_raw().into()),
+            (
+                "cache_line_p50_ns".to_owned(),
+                it.pings.value_at_quantile(MEDIAN).into(),
+            ),
+        ]);
+        value.into()
+    }
 }
 
-/// Everything, for programs: each row with its quantiles in nanoseconds and its ratios to the echo
-/// and to the raw cache line; on top the ratios of the last row, the 15-state estimate.
-pub fn json(rows: &[Row]) -> Value {
-    let (echo, raw) = (find(rows, echo::NAME), find(rows, cache_line::NAME));
-    let of = |row: &Row| {
-        let mut value = json!({
-            "name": row.name,
-            "rounds": row.histogram.len(),
-            "max_ns": row.histogram.max(),
-            "ratio_p50": ratio(row, echo, 0.5),
-            "ratio_p999": ratio(row, echo, 0.999),
-            "ratio_p50_cache_line": ratio(row, raw, 0.5),
-        });
-        for (name, quantile) in QUANTILES {
-            value[format!("{name}_ns")] = row.histogram.value_at_quantile(quantile).into();
-        }
-        value
+/// What was measured, without what came of it.
+fn identity(row: &Row) -> Map<String, Value> {
+    let rate = match row.pace {
+        Pace::Saturated => Value::Null,
+        Pace::Hz(rate) => rate.into(),
     };
-    json!({
-        "rows": rows.iter().map(of).collect::<Vec<_>>(),
-        "ratio_p50": rows.last().and_then(|row| ratio(row, echo, 0.5)),
-        "ratio_p999": rows.last().and_then(|row| ratio(row, echo, 0.999)),
-    })
+    Map::from_iter([
+        ("name".to_owned(), row.case.mechanism.name().into()),
+        ("wait".to_owned(), row.case.wait.name().into()),
+        ("pace".to_owned(), row.pace.name().into()),
+        ("rate_hz".to_owned(), rate),
+        ("chunks_left_out".to_owned(), row.mixed.into()),
+    ])
 }
+
+/// A row all of whose chunks were left out.
+fn empty_json(row: &Row) -> Value {
+    let mut value = identity(row);
+    value.insert("placement".to_owned(), Value::Null);
+    value.insert("count".to_owned(), 0.into());
+    value.into()
+}
+
+fn tilde(is_noise: bool) -> &'static str {
+    if is_noise { "~" } else { "" }
+}
+
+/// How many rows a report has.
+pub const ROWS: usize = CASES.len() * PACES.len();

@@ -20,6 +20,8 @@ use crate::pin;
 const PERIOD_NS: u64 = 1_000_000;
 /// Samples sent to initialise; the first fix is due at the 20th.
 const FIRST: u64 = 30;
+/// Samples from one fix to the next, where there are any: 5 Hz at 1 kHz.
+const FIX_EVERY: u64 = 200;
 /// Turn and way of a step of odometry: a circle of 10 m radius, counter-clockwise from the origin.
 const STEP_RAD: f64 = 1e-3;
 const STEP_M: f64 = 1e-2;
@@ -46,21 +48,50 @@ pub struct Estimate<E: model::Estimate> {
 /// # Errors
 /// It cannot be started, or does not answer.
 pub fn imu(biases: bool, wait: Wait, cpu: usize) -> anyhow::Result<Estimate<EstimateSe23>> {
-    let config = format!(
-        "model = \"imu\"\nbiases = {biases}\n\
-         [noise]\ngyro_density = 1e-3\naccel_density = 1e-2\n\
-         [initial]\nlevel_window_s = 0.01\n\
-         [runtime]\nwait = \"{}\"\n",
-        wait.name()
-    );
-    let first = |feeder: &mut Feeder, stamp_ns| {
-        if stamp_ns == 20 * PERIOD_NS {
+    let config = inertial(&format!("biases = {biases}\n"), wait);
+    let send = |feeder: &mut Feeder, stamp_ns| feeder.imu(&at_rest(stamp_ns));
+    Estimate::start(&config, cpu, imu_at_first, send, ESTIMATE_PROPAGATED)
+}
+
+/// The same with biases and a position fix every 200 samples, fused by the filter or by the
+/// smoother with a window of 50 states. What ends a round is the estimate of the sample itself,
+/// which waits for no fix: a solve can only hold up the sample after it.
+///
+/// # Errors
+/// It cannot be started, or does not answer.
+pub fn aided(smooths: bool, wait: Wait, cpu: usize) -> anyhow::Result<Estimate<EstimateSe23>> {
+    let estimator = if smooths {
+        "estimator = \"smoother\"\n[smoother]\nwindow = 50\n"
+    } else {
+        ""
+    };
+    let send = |feeder: &mut Feeder, stamp_ns: u64| {
+        if (stamp_ns / PERIOD_NS).is_multiple_of(FIX_EVERY) {
             feeder.position(&fix(stamp_ns, 3, [0.0; 3]))?;
         }
         feeder.imu(&at_rest(stamp_ns))
     };
-    let send = |feeder: &mut Feeder, stamp_ns| feeder.imu(&at_rest(stamp_ns));
-    Estimate::start(&config, cpu, first, send, ESTIMATE_PROPAGATED)
+    let config = inertial(estimator, wait);
+    Estimate::start(&config, cpu, imu_at_first, send, ESTIMATE_PROPAGATED)
+}
+
+/// The model `imu`, with what is `special` at the top of the file.
+fn inertial(special: &str, wait: Wait) -> String {
+    format!(
+        "model = \"imu\"\n{special}\
+         [noise]\ngyro_density = 1e-3\naccel_density = 1e-2\n\
+         [initial]\nlevel_window_s = 0.01\n\
+         [runtime]\nwait = \"{}\"\n",
+        wait.name()
+    )
+}
+
+/// The first samples, and the fix to start from.
+fn imu_at_first(feeder: &mut Feeder, stamp_ns: u64) -> Result<usize, SendError> {
+    if stamp_ns == 20 * PERIOD_NS {
+        feeder.position(&fix(stamp_ns, 3, [0.0; 3]))?;
+    }
+    feeder.imu(&at_rest(stamp_ns))
 }
 
 /// A daemon of the model `odometry2d` on processor `cpu` with a linearly constrained filter, blind

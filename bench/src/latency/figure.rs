@@ -14,7 +14,7 @@ const CURVES: usize = 5;
 /// A figure: its title, and which rows it shows.
 type Panel = (&'static str, fn(&Row) -> bool);
 
-const PANELS: [Panel; 5] = [
+const PANELS: [Panel; 6] = [
     ("Spinning at saturation: shared memory", |row| {
         is_of(
             row,
@@ -65,6 +65,18 @@ const PANELS: [Panel; 5] = [
                 Mechanism::Filter15,
                 Mechanism::UnixSocket,
                 Mechanism::UdpSocket,
+            ],
+        )
+    }),
+    ("Spinning at 1000 Hz: filter and smoother", |row| {
+        is_of(
+            row,
+            Wait::Spin,
+            Pace::Hz(1000),
+            &[
+                Mechanism::Filter15,
+                Mechanism::Aided15,
+                Mechanism::Smoother15,
             ],
         )
     }),

@@ -23,6 +23,10 @@ pub enum Mechanism {
     Filter15,
     /// The daemon: IMU sample to estimate, 9 states.
     Filter9,
+    /// The same as [`Self::Filter15`] with a position fix every 200 samples.
+    Aided15,
+    /// The same as [`Self::Aided15`] with the smoother, window 50, in place of the filter.
+    Smoother15,
     /// The daemon: planar odometry to estimate, linearly constrained filter.
     LcInekf,
     /// The same with a position fix beside each sample, to the estimate that holds both.
@@ -44,6 +48,8 @@ impl Mechanism {
             Self::Echo => "plain iceoryx2 echo",
             Self::Filter15 => "estimate, 15 states",
             Self::Filter9 => "estimate, 9 states",
+            Self::Aided15 => "estimate, 15 states, fixes",
+            Self::Smoother15 => "smoother, 15 states, fixes",
             Self::LcInekf => "LC-InEKF, odometry2d",
             Self::LcInekfFix => "LC-InEKF, odometry2d + fix",
             Self::UnixSocket => "Unix-domain socket",
@@ -119,13 +125,15 @@ const fn event(mechanism: Mechanism) -> Case {
 }
 
 /// Every case, in the order of each turn: what is compared most stands side by side.
-pub const CASES: [Case; 17] = [
+pub const CASES: [Case; 19] = [
     spin(Mechanism::CacheLine),
     spin(Mechanism::Blackboard),
     spin(Mechanism::PreLoanedEcho),
     spin(Mechanism::Echo),
     spin(Mechanism::Filter15),
     spin(Mechanism::Filter9),
+    spin(Mechanism::Aided15),
+    spin(Mechanism::Smoother15),
     spin(Mechanism::LcInekf),
     spin(Mechanism::LcInekfFix),
     spin(Mechanism::UnixSocket),
@@ -155,6 +163,8 @@ impl Case {
             }
             Mechanism::Filter15 => Box::new(estimate::imu(true, wait, cpu)?),
             Mechanism::Filter9 => Box::new(estimate::imu(false, wait, cpu)?),
+            Mechanism::Aided15 => Box::new(estimate::aided(false, wait, cpu)?),
+            Mechanism::Smoother15 => Box::new(estimate::aided(true, wait, cpu)?),
             Mechanism::LcInekf => Box::new(estimate::odometry(false, wait, cpu)?),
             Mechanism::LcInekfFix => Box::new(estimate::odometry(true, wait, cpu)?),
             Mechanism::UnixSocket | Mechanism::UdpSocket => {

@@ -295,9 +295,9 @@ mod tests {
         let interrupted = chunk(&[(1000, 980), (5000, 20)], &[(100, 980), (4000, 20)]);
         assert_eq!(noise(&[&interrupted], 0.99), Some(Noise::Disturbed));
         assert_eq!(noise(&[&interrupted], MEDIAN), None);
-        // Others had the processor five times, and ten rounds are slower.
+        // Others had the processor six times, and ten rounds are slower.
         let preempted = Chunk {
-            preempted: 5,
+            preempted: 6,
             ..interrupted.clone()
         };
         assert_eq!(noise(&[&preempted], 0.99), Some(Noise::Preempted));

@@ -79,6 +79,8 @@ enum Command {
 const READING: &str = "\
 What is measured, in nanoseconds, from before the sample is sent until its answer is read:
   estimate, 15 / 9 states     IMU sample to a real daemon, estimate with full covariance back
+  ..., fixes                  the same with a position fix every 200 samples, fused by the filter or by
+                              the smoother, to the estimate of the sample itself
   LC-InEKF, odometry2d        planar odometry to its estimate; + fix: with a position fix beside it,
                               to the estimate that holds both
   plain iceoryx2 echo         what shared memory alone costs with the same messages

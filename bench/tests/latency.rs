@@ -11,13 +11,15 @@ use serde_json::Value;
 
 const ROUNDS: u64 = 400;
 const SECONDS: f64 = 0.05;
-const SPIN: [&str; 10] = [
+const SPIN: [&str; 12] = [
     "raw cache line",
     "iceoryx2 blackboard",
     "pre-loaned iceoryx2 echo",
     "plain iceoryx2 echo",
     "estimate, 15 states",
     "estimate, 9 states",
+    "estimate, 15 states, fixes",
+    "smoother, 15 states, fixes",
     "LC-InEKF, odometry2d",
     "LC-InEKF, odometry2d + fix",
     "Unix-domain socket",
@@ -128,8 +130,8 @@ fn every_row_is_measured_and_nothing_is_left() {
             }
         }
     }
-    assert_eq!(report["rows"].as_array().map(Vec::len), Some(17 * 4));
-    assert_eq!(report["chunks"], 17 * 4);
+    assert_eq!(report["rows"].as_array().map(Vec::len), Some(19 * 4));
+    assert_eq!(report["chunks"], 19 * 4);
 
     // The ratios on top are those of two rows, if both are of one placement.
     let p50 = |name| find(&report, name, "spin", None)[0]["p50_ns"].as_f64();

@@ -1,14 +1,14 @@
 //! After construction and warm-up the engine allocates nothing, whatever it is fed: it cannot grow.
 
 mod common;
-
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+#[path = "../estimator/tests/common/counting.rs"]
+mod counting;
 
 use common::{
     Engine, Input, PERIOD_NS, assert_refused, feed, heading, imu, isotropic, lively_imu, position,
     settings, stamp, state_on_circle, velocity,
 };
+use counting::allocations;
 use inekf_service::engine::Outbox;
 use inekf_service::engine::settings::{LevelSource, PositionSource};
 use inekf_service::engine::tally::Refusal;
@@ -17,51 +17,6 @@ use inekf_shared::message::{
     REASON_NOT_FINITE, REASON_NOT_READY, REASON_OUT_OF_RANGE, REASON_STAMP_NOT_AFTER,
     REASON_WRONG_MODEL, Zero,
 };
-
-thread_local! {
-    /// Allocations of this thread. The harness has threads of its own.
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counted.
-struct Counting;
-
-fn count() {
-    // While the thread ends the counter may be gone; nobody looks at it any more then.
-    let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-}
-
-// SAFETY: every call goes to the system's allocator with the arguments unchanged; the counter is a
-// plain cell of the thread without a destructor, which never allocates.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: the caller keeps the contract of `dealloc`; `pointer` came from the system.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `realloc`; `pointer` came from the system.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Allocations and frees of this thread while `work` runs.
-fn allocations(work: impl FnOnce()) -> u64 {
-    let before = ALLOCATIONS.get();
-    work();
-    ALLOCATIONS.get() - before
-}
 
 /// Keeps the last estimate, as a latest-value slot does.
 struct Latest(EstimateSe23);

@@ -40,7 +40,7 @@ fn open_daemon(node: &Node) -> Result<Daemon, TransportError> {
 
 /// Run by the test below in a process of its own; without the environment it does nothing.
 #[test]
-#[ignore = "the other process of the test below"]
+#[ignore = "the other process of the test below, which runs it: cargo test -p inekf-shared --test killed"]
 fn child() {
     if env::var_os(IPC_ROOT_VARIABLE).is_none() {
         return;

@@ -1,8 +1,11 @@
 //! No filter allocates: every gain rule and the adaptive bank, in the plane and in space, after it was made.
 
 mod common;
+#[path = "common/counting.rs"]
+mod counting;
 
 use common::section7::{Law, Run, odometry_noise, start_variances};
+use counting::allocations;
 use inekf::filter::{
     Adaptive, Belief, Consider, Constrained, Covariance, Expected, HInfinity, HInfinityGain, Left,
     STANDARD_MODES, UpdateOptions, Verdict, propagate_augmented, propagate_odometry,
@@ -14,59 +17,12 @@ use inekf::model::{
     ProcessMismatch, SpatialFix, Unknowns,
 };
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::hint::black_box;
-
-thread_local! {
-    /// Allocations and frees of this thread. The harness has threads of its own.
-    static CALLS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counted.
-struct Counting;
-
-fn count() {
-    // While the thread ends the counter may be gone; nobody looks at it any more then.
-    let _ = CALLS.try_with(|calls| calls.set(calls.get() + 1));
-}
-
-// SAFETY: every call goes to the system's allocator with the arguments unchanged; the counter is a plain cell of the
-// thread without a destructor, which never allocates.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: the caller keeps the contract of `dealloc`; `pointer` came from the system.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `realloc`; `pointer` came from the system.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Allocations and frees of this thread while `work` runs.
-fn calls(work: impl FnOnce()) -> u64 {
-    let before = CALLS.get();
-    work();
-    CALLS.get() - before
-}
 
 #[test]
 fn the_counter_counts() {
-    assert!(calls(|| drop(black_box(vec![1_u8; 100]))) >= 2);
-    assert_eq!(calls(|| {}), 0);
+    assert!(allocations(|| drop(black_box(vec![1_u8; 100]))) >= 2);
+    assert_eq!(allocations(|| {}), 0);
 }
 
 const PROCESS: [ProcessMismatch; 3] = [
@@ -88,7 +44,7 @@ fn the_adaptive_bank_allocates_nothing_in_the_plane() {
     let prior = Belief::new(run.start, Covariance::from_variances(&start_variances()));
     let options = UpdateOptions::ITERATED;
     let mut accepted = 0;
-    let calls = calls(|| {
+    let calls = allocations(|| {
         let unknowns = Unknowns::new::<2, 6>(&PROCESS, &OUTPUTS).expect("five of six");
         let sigmas = SVector::from([0.08, 0.05, 0.005, 0.06, 0.03, 0.0]);
         let expected = Expected::of(&unknowns, &sigmas, &sigmas);
@@ -113,7 +69,7 @@ fn the_adaptive_bank_allocates_nothing_in_space() {
         source: 0,
         axis_w: None,
     };
-    let calls = calls(|| {
+    let calls = allocations(|| {
         let unknowns = Unknowns::new::<3, 6>(&PROCESS, &[turned]).expect("six");
         let sigmas = SVector::from([0.08, 0.05, 0.005, 0.03, 0.03, 0.03]);
         let expected = Expected::of(&unknowns, &sigmas, &sigmas);
@@ -152,7 +108,7 @@ fn no_gain_rule_allocates() {
         gamma: 1e-3,
         gain: HInfinityGain::Widened,
     };
-    let calls = calls(|| {
+    let calls = allocations(|| {
         let unknowns = Unknowns::new::<2, 5>(&PROCESS, &OUTPUTS).expect("five");
         let mut way = ProcessColumns::new(&[Declared::hard(PROCESS[0])]).expect("room");
         let mut beliefs = [Belief::<SE2, Left, 3>::new(run.start, start); 4];

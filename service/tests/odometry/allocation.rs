@@ -1,51 +1,11 @@
 //! After construction no filter allocates, whatever it is fed.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
 use inekf_service::engine::{Engine, History, Model, Outbox, Use, build};
 
+use super::counting::allocations;
 use super::harness::{
     CHOICES, Input, PERIOD, START, feed, fix, parse, planar_state, plane, space, spatial_state,
 };
-
-thread_local! {
-    /// Allocations of this thread. The harness has threads of its own.
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counted.
-struct Counting;
-
-fn count() {
-    // While the thread ends the counter may be gone; nobody looks at it any more then.
-    let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-}
-
-// SAFETY: every call goes to the system's allocator with the arguments unchanged; the counter is a
-// plain cell of the thread without a destructor, which never allocates.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: the caller keeps the contract of `dealloc`; `pointer` came from the system.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `realloc`; `pointer` came from the system.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// Counts estimates and keeps none.
 struct Sink(u64);
@@ -63,12 +23,13 @@ impl Use for Allocations<'_> {
 
     fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) -> (u64, u64) {
         let mut sink = Sink(0);
-        let before = ALLOCATIONS.get();
-        for input in self.0 {
-            let _ = feed(&mut engine, input, &mut sink);
-            let _ = std::hint::black_box((engine.state(), engine.snapshot()));
-        }
-        (ALLOCATIONS.get() - before, sink.0)
+        let allocated = allocations(|| {
+            for input in self.0 {
+                let _ = feed(&mut engine, input, &mut sink);
+                let _ = std::hint::black_box((engine.state(), engine.snapshot()));
+            }
+        });
+        (allocated, sink.0)
     }
 }
 
@@ -116,9 +77,8 @@ fn everything(dimension: usize) -> Vec<Input> {
 
 #[test]
 fn no_filter_allocates() {
-    let first = ALLOCATIONS.get();
-    drop(std::hint::black_box(vec![1_u8; 100]));
-    assert!(ALLOCATIONS.get() >= first + 2, "the counter counts");
+    let counted = allocations(|| drop(std::hint::black_box(vec![1_u8; 100])));
+    assert!(counted >= 2, "the counter counts");
     for dimension in [2, 3] {
         let inputs = everything(dimension);
         for choice in CHOICES {

@@ -2,6 +2,8 @@
 //! every kind, and the recordings.
 
 mod allocation;
+#[path = "../../estimator/tests/common/counting.rs"]
+mod counting;
 mod filters;
 mod gate;
 mod harness;

@@ -7,6 +7,8 @@ mod common;
 mod against_filter;
 mod against_library;
 mod allocation;
+#[path = "../../estimator/tests/common/counting.rs"]
+mod counting;
 mod golden;
 mod late;
 mod lockout;

@@ -10,6 +10,8 @@ mod common;
 mod align_straight;
 mod allocation;
 mod batch;
+#[path = "../common/counting.rs"]
+mod counting;
 mod deviation;
 mod drive;
 mod extended;

@@ -1,14 +1,12 @@
 //! What a window does with fixes that it cannot or must not use, and that it takes no memory after construction.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
 use inekf::filter::{Belief, Left, UpdateOptions, Verdict, update};
 use inekf::lie::SE23;
 use inekf::model::{InertialState, NavState, PositionObservation};
 use inekf::smoother::{Jacobians, Preintegration, Window, WindowError, WindowOptions};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::counting::allocations;
 use crate::drive::{ANISOTROPIC, Drive, ISOTROPIC};
 
 type Window9 = Window<SE23, Left, 9>;
@@ -164,67 +162,29 @@ fn a_window_that_begins_again_is_new() {
     }
 }
 
-thread_local! {
-    /// Allocations of this thread. The harness has threads of its own.
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counted.
-struct Counting;
-
-fn count() {
-    // While the thread ends the counter may be gone; nobody looks at it any more then.
-    let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-}
-
-// SAFETY: every call goes to the system's allocator with the arguments unchanged; the counter is a
-// plain cell of the thread without a destructor, which never allocates.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count();
-        // SAFETY: the caller keeps the contract of `dealloc`; `pointer` came from the system.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
-        // SAFETY: the caller keeps the contract of `realloc`; `pointer` came from the system.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
 fn assert_allocates_nothing<G: InertialState<D>, const D: usize>(options: &WindowOptions) {
     let drive = Drive::<G, D>::new(30, 0.2, ANISOTROPIC, 26);
     let mut window = Window::<G, Left, D>::new(&drive.first, options);
-    let before = ALLOCATIONS.with(Cell::get);
-    for (k, (motion, fix)) in drive.seconds.iter().enumerate() {
-        window.push(motion);
-        let covariance_w = if k % 2 == 0 { ISOTROPIC } else { ANISOTROPIC };
-        let fix = PositionObservation {
-            covariance_w,
-            ..*fix
-        };
-        assert!(window.update(fix).is_ok());
-    }
-    assert!(window.smoothed(0).is_some());
-    window.restart(&drive.first);
-    assert_eq!(ALLOCATIONS.with(Cell::get), before);
+    let allocated = allocations(|| {
+        for (k, (motion, fix)) in drive.seconds.iter().enumerate() {
+            window.push(motion);
+            let covariance_w = if k % 2 == 0 { ISOTROPIC } else { ANISOTROPIC };
+            let fix = PositionObservation {
+                covariance_w,
+                ..*fix
+            };
+            assert!(window.update(fix).is_ok());
+        }
+        assert!(window.smoothed(0).is_some());
+        window.restart(&drive.first);
+    });
+    assert_eq!(allocated, 0);
 }
 
 #[test]
 fn a_window_allocates_at_construction_only() {
-    let before = ALLOCATIONS.with(Cell::get);
-    drop(std::hint::black_box(Box::new(1)));
-    assert!(ALLOCATIONS.with(Cell::get) > before, "the counter counts");
+    let counted = allocations(|| drop(std::hint::black_box(Box::new(1))));
+    assert!(counted > 0, "the counter counts");
     for (options, _) in both() {
         assert_allocates_nothing::<SE23, 9>(&options);
         assert_allocates_nothing::<NavState, 15>(&options);

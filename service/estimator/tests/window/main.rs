@@ -10,6 +10,8 @@ mod common;
 
 mod align_straight;
 mod biased;
+#[path = "../common/counting.rs"]
+mod counting;
 mod drive;
 mod edges;
 mod gains;

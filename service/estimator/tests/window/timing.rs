@@ -87,7 +87,7 @@ fn filter_s<G: InertialState<D>, const D: usize>() -> f64 {
 }
 
 #[test]
-#[ignore = "prints times; run it in release, alone"]
+#[ignore = "prints times, asserts none: cargo test --release -p inekf --test window -- --ignored timing --nocapture"]
 fn timing() {
     let isotropic = Matrix3::identity();
     let anisotropic = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 2.25));

@@ -16,7 +16,7 @@
 
 use inekf_shared::message::{EstimateMessage, EstimateSe23, SmoothedState};
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, LatestReader, Node, Subscriber, TransportError};
+use inekf_shared::transport::{self, LatestReader, Node, Received, Subscriber, TransportError};
 
 use crate::model::Model;
 
@@ -68,16 +68,18 @@ impl<E: EstimateMessage> EstimateReader<E> {
         })
     }
 
-    /// The next estimate, or `None` if none waits. Never blocks.
+    /// The next estimate where it lies in shared memory, or `None` if none waits. Never blocks, copies nothing.
+    ///
+    /// Drop it soon: at most [`MAX_BORROWED`](inekf_shared::qos::MAX_BORROWED) may be held at a time.
     ///
     /// # Errors
     /// [`ReadError`].
-    pub fn next_estimate(&mut self) -> Result<Option<E>, ReadError> {
+    pub fn borrow_next(&mut self) -> Result<Option<Received<E>>, ReadError> {
         let received = self.estimates.receive().map_err(|error| ReadError {
             cause: error.to_string(),
         })?;
-        Ok(received.map(|sample| {
-            let seq = sample.head().estimate_seq;
+        if let Some(estimate) = &received {
+            let seq = estimate.head().estimate_seq;
             // A smaller number is a daemon that has started again.
             if let Some(expected) = self.next_seq
                 && seq > expected
@@ -85,8 +87,16 @@ impl<E: EstimateMessage> EstimateReader<E> {
                 self.missed += seq - expected;
             }
             self.next_seq = Some(seq + 1);
-            *sample
-        }))
+        }
+        Ok(received)
+    }
+
+    /// A copy of the next estimate, or `None` if none waits. Never blocks.
+    ///
+    /// # Errors
+    /// [`ReadError`].
+    pub fn next_estimate(&mut self) -> Result<Option<E>, ReadError> {
+        Ok(self.borrow_next()?.map(|estimate| *estimate))
     }
 
     /// Estimates that were overwritten before they were read.

@@ -166,6 +166,7 @@ fn run<M: Model, H: History<M>>(
     stop: &AtomicBool,
 ) -> anyhow::Result<()> {
     let mut ports = Ports::open(instance, config.runtime.wait, config.smoother.is_some())?;
+    daemon::realtime::apply(&config.runtime);
     let mut out = std::io::stdout();
     writeln!(
         out,

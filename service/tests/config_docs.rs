@@ -382,6 +382,9 @@ fn a_minimal_file_takes_the_documented_defaults() {
         runtime: Runtime {
             wait: WaitMode::Event,
             event_timeout_ms: 10,
+            cpu: None,
+            priority: None,
+            lock_memory: false,
         },
     };
     assert_eq!(Config::from_toml_str(MINIMAL, "minimal").unwrap(), expected);

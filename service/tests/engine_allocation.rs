@@ -22,7 +22,7 @@ use inekf_shared::message::{
 struct Latest(EstimateSe23);
 
 impl Outbox<EstimateSe23> for Latest {
-    fn publish(&mut self, estimate: &EstimateSe23) {
+    fn publish(&mut self, estimate: &mut EstimateSe23) {
         self.0 = *estimate;
     }
 }

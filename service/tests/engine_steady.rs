@@ -78,7 +78,7 @@ fn the_same_inputs_give_the_same_bytes() {
 struct Latest(EstimateSe23);
 
 impl Outbox<EstimateSe23> for Latest {
-    fn publish(&mut self, estimate: &EstimateSe23) {
+    fn publish(&mut self, estimate: &mut EstimateSe23) {
         self.0 = *estimate;
     }
 }

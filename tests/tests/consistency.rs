@@ -72,7 +72,7 @@ struct Record {
 }
 
 impl Outbox<EstimateSe23> for Record {
-    fn publish(&mut self, estimate: &EstimateSe23) {
+    fn publish(&mut self, estimate: &mut EstimateSe23) {
         let head = &estimate.head;
         if head.stamp_ns < CONVERGED_S * SECOND_NS {
             return;

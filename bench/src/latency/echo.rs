@@ -1,18 +1,15 @@
 //! What shared memory alone costs: an iceoryx2 echo with the service's own messages, an `ImuSample`
 //! there and an `EstimateSe23` back; slots loaned at send as iceoryx2's own examples do, or ahead.
 
-use std::mem::MaybeUninit;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use anyhow::bail;
-use iceoryx2::prelude::ipc;
-use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use inekf_client::daemon::private_instance;
 use inekf_shared::clock::monotonic_ns;
-use inekf_shared::message::{EstimateSe23, ImuSample, Message, Zero};
+use inekf_shared::message::{EstimateSe23, ImuSample, Zero};
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Node, Publisher, Subscriber, WakeNotifier};
+use inekf_shared::transport::{self, Node, Outlet, Subscriber, WakeNotifier};
 
 use super::mechanism::{Mechanism, Wait};
 use super::partner::{
@@ -20,44 +17,9 @@ use super::partner::{
 };
 use crate::pin;
 
-/// A publisher, with a slot loaned ahead if asked for.
-struct Outlet<M: Message> {
-    publisher: Publisher<M>,
-    is_ahead: bool,
-    ahead: Option<SampleMutUninit<ipc::Service, MaybeUninit<M>, ()>>,
-}
-
-impl<M: Message> Outlet<M> {
-    fn new(publisher: Publisher<M>, is_ahead: bool) -> anyhow::Result<Self> {
-        let mut outlet = Self {
-            publisher,
-            is_ahead,
-            ahead: None,
-        };
-        outlet.loan_ahead()?;
-        Ok(outlet)
-    }
-
-    /// Returns the number of receivers.
-    fn send(&mut self, message: M) -> anyhow::Result<usize> {
-        let slot = match self.ahead.take() {
-            Some(slot) => slot,
-            None => self.publisher.loan_uninit()?,
-        };
-        Ok(slot.write_payload(message).send()?)
-    }
-
-    /// Loans the next slot, away from the path of a message.
-    fn loan_ahead(&mut self) -> anyhow::Result<()> {
-        if self.is_ahead && self.ahead.is_none() {
-            self.ahead = Some(self.publisher.loan_uninit()?);
-        }
-        Ok(())
-    }
-}
-
-fn is_ahead(mechanism: Mechanism) -> bool {
-    mechanism == Mechanism::PreLoanedEcho
+/// Slots loaned ahead: none where they are loaned at send.
+fn depth(mechanism: Mechanism) -> usize {
+    usize::from(mechanism == Mechanism::PreLoanedEcho)
 }
 
 /// An echo process, and the ports to it.
@@ -86,7 +48,7 @@ impl Echo {
         };
         let partner = Partner::start(mechanism, wait, instance.as_str(), cpu, Stdio::null())?;
         let mut echo = Self {
-            samples: Outlet::new(samples, is_ahead(mechanism))?,
+            samples: Outlet::new(samples, depth(mechanism)),
             answers,
             wake,
             next: 1,
@@ -100,14 +62,14 @@ impl Echo {
             }
             std::thread::sleep(Duration::from_millis(1));
         }
-        echo.samples.loan_ahead()?;
+        echo.samples.restock();
         Ok(echo)
     }
 
     fn send(&mut self, seq: u64) -> anyhow::Result<usize> {
         let mut sample = ImuSample::ZERO;
         sample.header.seq = seq;
-        let receivers = self.samples.send(sample)?;
+        let receivers = self.samples.send(&sample)?;
         if let Some(wake) = &self.wake {
             // A partner that cannot be woken looks by itself.
             let _ = wake.notify();
@@ -127,7 +89,7 @@ impl RoundTrip for Echo {
                 && answer.head.seq == self.next
             {
                 let round_ns = monotonic_ns() - sent_ns;
-                self.samples.loan_ahead()?;
+                self.samples.restock();
                 return Ok(round_ns);
             }
             still_patient(sent_ns, "the echo process")?;
@@ -162,7 +124,7 @@ pub fn serve(
     pin::pin(None, cpu)?;
     let node = transport::open_node("inekf-echo")?;
     let answers = transport::estimate::<EstimateSe23>(&node, instance)?.publisher()?;
-    let mut answers = Outlet::new(answers, is_ahead(mechanism))?;
+    let mut answers = Outlet::new(answers, depth(mechanism));
     let listener = match wait {
         Wait::Spin => None,
         Wait::Event => Some(transport::wake(&node, instance)?.listener()?),
@@ -181,7 +143,7 @@ pub fn serve(
         }
         let mut answer = EstimateSe23::ZERO;
         answer.head.seq = sample.header.seq;
-        answers.send(answer)?;
-        answers.loan_ahead()?;
+        answers.send(&answer)?;
+        answers.restock();
     }
 }

@@ -38,6 +38,7 @@ pub struct Estimate<E: model::Estimate> {
     /// The flag of the estimate that ends a round.
     flag: u32,
     stamp_ns: u64,
+    inside_ns: u64,
     daemon: Daemon,
     _config: TempDir,
 }
@@ -152,6 +153,7 @@ impl<E: model::Estimate> Estimate<E> {
             send,
             flag,
             stamp_ns: FIRST * PERIOD_NS,
+            inside_ns: 0,
             daemon,
             _config: folder,
         })
@@ -195,15 +197,22 @@ impl<E: model::Estimate> RoundTrip for Estimate<E> {
         let sent_ns = monotonic_ns();
         (self.send)(&mut self.feeder, self.stamp_ns)?;
         loop {
-            if let Some(estimate) = self.reader.next_estimate()?
+            if let Some(estimate) = self.reader.borrow_next()?
                 && estimate.head().stamp_ns == self.stamp_ns
                 && estimate.head().flags & self.flag != 0
             {
-                return Ok(monotonic_ns() - sent_ns);
+                let round_ns = monotonic_ns() - sent_ns;
+                let head = estimate.head();
+                self.inside_ns = head.published_ns.saturating_sub(head.received_ns);
+                return Ok(round_ns);
             }
             still_patient(sent_ns, "the daemon")?;
             std::hint::spin_loop();
         }
+    }
+
+    fn inside(&self) -> Option<u64> {
+        Some(self.inside_ns)
     }
 
     fn process(&self) -> Option<u32> {

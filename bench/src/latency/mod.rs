@@ -30,10 +30,10 @@ use indicatif::ProgressBar;
 use inekf_shared::clock::monotonic_ns;
 
 use machine::Machine;
-use mechanism::{CASES, PACES, Pace, Wait};
+use mechanism::{CASES, Case, PACES, Pace, Wait};
 use partner::RoundTrip;
 use placement::{Placement, ping_pong};
-use report::{ROWS, Report};
+use report::Report;
 use row::{Chunk, Row, histogram};
 
 use crate::pin;
@@ -47,8 +47,12 @@ const WARM_UP_SHARE: u64 = 20;
 const WARM_UP: u64 = 20;
 
 /// What to measure.
-#[derive(Args, Clone, Copy, Debug)]
+#[derive(Args, Clone, Debug)]
 pub struct LatencyOptions {
+    /// Only the rows whose names contain this, e.g. "15 states"; may be given several times. The ratio at the end wants
+    /// "plain iceoryx2 echo" and "estimate, 15 states".
+    #[arg(long, value_name = "TEXT")]
+    pub only: Vec<String>,
     /// Round trips per row at saturation; a twentieth for rows that are woken.
     #[arg(long, default_value_t = 200_000)]
     pub rounds: u64,
@@ -63,6 +67,22 @@ pub struct LatencyOptions {
     /// below this, ns.
     #[arg(long, default_value_t = 220, value_name = "NS")]
     pub sibling_below_ns: u64,
+}
+
+impl LatencyOptions {
+    /// The cases that [`LatencyOptions::only`] lets through.
+    fn cases(&self) -> anyhow::Result<Vec<Case>> {
+        let is_wanted = |case: &Case| {
+            let name = case.mechanism.name();
+            self.only.is_empty() || self.only.iter().any(|text| name.contains(text))
+        };
+        let cases: Vec<Case> = CASES.into_iter().filter(is_wanted).collect();
+        if cases.is_empty() {
+            let names = CASES.map(|case| case.mechanism.name()).join("\n  ");
+            bail!("--only lets no row through; there are\n  {names}");
+        }
+        Ok(cases)
+    }
 }
 
 /// Measures every row, with a progress bar on standard error.
@@ -86,11 +106,12 @@ pub fn measure(options: &LatencyOptions) -> anyhow::Result<Report> {
     };
     let mut machine = Machine::describe(processors.len(), [here, there]);
     pin::pin(None, here)?;
-    let cases = CASES.into_iter();
-    let mut rows: Vec<Row> = cases
+    let mut rows: Vec<Row> = options
+        .cases()?
+        .into_iter()
         .flat_map(|case| PACES.map(|pace| Row::new(case, pace)))
         .collect();
-    let bar = progress("chunks", options.turns * ROWS as u64);
+    let bar = progress("chunks", options.turns * rows.len() as u64);
     for _ in 0..options.turns {
         for rows in rows.chunks_mut(PACES.len()) {
             measure_case(rows, there, options, &bar)?;
@@ -101,7 +122,7 @@ pub fn measure(options: &LatencyOptions) -> anyhow::Result<Report> {
     Ok(Report {
         rows,
         machine,
-        options: *options,
+        options: options.clone(),
     })
 }
 
@@ -122,9 +143,17 @@ fn measure_case(
     let mut before = ping_pong(&mut *partner, cpu)?;
     for row in rows {
         let preempted = preemption::count(partner.process());
-        let (rounds, missed) = match row.pace {
-            Pace::Saturated => (saturated(&mut *partner, rounds_of(case.wait, options))?, 0),
-            Pace::Hz(rate) => paced(&mut *partner, rate, options.seconds / options.turns as f64)?,
+        let mut lengths = Lengths::new()?;
+        let missed = match row.pace {
+            Pace::Saturated => {
+                let rounds = rounds_of(case.wait, options);
+                saturated(&mut *partner, rounds, &mut lengths)?;
+                0
+            }
+            Pace::Hz(rate) => {
+                let seconds = options.seconds / options.turns as f64;
+                paced(&mut *partner, rate, seconds, &mut lengths)?
+            }
         };
         let preempted = preemption::count(partner.process()).saturating_sub(preempted);
         let after = ping_pong(&mut *partner, cpu)?;
@@ -132,7 +161,8 @@ fn measure_case(
         let mut pings = before;
         pings.add(&after)?;
         let chunk = Chunk {
-            rounds,
+            rounds: lengths.rounds,
+            inside: lengths.inside,
             missed,
             preempted,
             pings,
@@ -160,28 +190,54 @@ fn warm_up(partner: &mut dyn RoundTrip, rounds: u64) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// One round after the other.
-fn saturated(partner: &mut dyn RoundTrip, rounds: u64) -> anyhow::Result<Histogram<u64>> {
-    warm_up(partner, rounds)?;
-    let mut lengths = histogram()?;
-    for _ in 0..rounds {
-        lengths.saturating_record(partner.round()?);
-    }
-    Ok(lengths)
+/// What the rounds of a chunk took.
+struct Lengths {
+    rounds: Histogram<u64>,
+    inside: Histogram<u64>,
 }
 
-/// Rounds at `rate` a second, for `seconds`; and how many times for one passed during another. This
+impl Lengths {
+    fn new() -> anyhow::Result<Self> {
+        Ok(Self {
+            rounds: histogram()?,
+            inside: histogram()?,
+        })
+    }
+
+    fn add_round(&mut self, partner: &mut dyn RoundTrip) -> anyhow::Result<()> {
+        self.rounds.saturating_record(partner.round()?);
+        if let Some(inside_ns) = partner.inside() {
+            self.inside.saturating_record(inside_ns);
+        }
+        Ok(())
+    }
+}
+
+/// One round after the other.
+fn saturated(
+    partner: &mut dyn RoundTrip,
+    rounds: u64,
+    lengths: &mut Lengths,
+) -> anyhow::Result<()> {
+    warm_up(partner, rounds)?;
+    for _ in 0..rounds {
+        lengths.add_round(partner)?;
+    }
+    Ok(())
+}
+
+/// Rounds at `rate` a second, for `seconds`. Returns how many times for one passed during another. This
 /// side waits awake, so that what is measured is how the partner gets on with the pause.
 fn paced(
     partner: &mut dyn RoundTrip,
     rate: u32,
     seconds: f64,
-) -> anyhow::Result<(Histogram<u64>, u64)> {
+    lengths: &mut Lengths,
+) -> anyhow::Result<u64> {
     warm_up(partner, 0)?;
     let period_ns = 1_000_000_000 / u64::from(rate);
     let times = ((seconds * f64::from(rate)) as u64).max(1);
     let start_ns = monotonic_ns();
-    let mut lengths = histogram()?;
     let mut missed = 0;
     for time in 1..=times {
         let due_ns = start_ns + time * period_ns;
@@ -193,7 +249,7 @@ fn paced(
         while monotonic_ns() < due_ns {
             std::hint::spin_loop();
         }
-        lengths.saturating_record(partner.round()?);
+        lengths.add_round(partner)?;
     }
-    Ok((lengths, missed))
+    Ok(missed)
 }

@@ -31,6 +31,11 @@ pub trait RoundTrip {
     /// The other side does not answer.
     fn round(&mut self) -> anyhow::Result<u64>;
 
+    /// What of the last round a daemon needed from the sample in hand to its estimate sent, ns.
+    fn inside(&self) -> Option<u64> {
+        None
+    }
+
     /// The partner's process, if it is one.
     fn process(&self) -> Option<u32>;
 

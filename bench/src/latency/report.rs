@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::LatencyOptions;
 use super::machine::Machine;
-use super::mechanism::{CASES, Case, Mechanism, PACES, Pace, Wait};
+use super::mechanism::{Case, Mechanism, PACES, Pace, Wait};
 use super::placement::{PLACEMENTS, Placement};
 use super::row::{Distribution, FIGURES, MEDIAN, P999, Row};
 
@@ -115,7 +115,8 @@ impl Report {
         let _ = write!(
             text,
             "\n{} of {} chunks left out: the placement of the processors changed during them.\n\
-             ~ noise dominates the figure (the JSON says why); the maximum is a single round.\n",
+             ~ noise dominates the figure (the JSON says why); the maximum is a single round.\n\
+             inside: p50 of the daemon's own part, from the sample in hand to its estimate sent.\n",
             self.left_out(),
             self.chunks(),
         );
@@ -156,9 +157,13 @@ impl Report {
             let by_echo = echo.map_or("-".to_owned(), |echo| {
                 format!("{:.2}", it.ratio_to(echo, MEDIAN))
             });
+            let inside = match it.inside.len() {
+                0 => "-".to_owned(),
+                _ => format_ns(it.inside.value_at_quantile(MEDIAN) as f64),
+            };
             let _ = writeln!(
                 lines,
-                "{:>9.1}{by_echo:>9}{:>9}",
+                "{inside:>10}{:>9.1}{by_echo:>9}{:>9}",
                 it.ratio_to_raw(),
                 it.rounds.len()
             );
@@ -168,8 +173,8 @@ impl Report {
         }
         let title = format!("{}, {}, {}", wait.name(), pace.name(), placement.name());
         format!(
-            "\n{title}\n{:<28}{:>10}{:>10}{:>10}{:>10}{:>10}{:>9}{:>9}{:>9}\n{lines}",
-            "", "p50", "p99", "p99.9", "p99.99", "max", "/ line", "/ echo", "rounds"
+            "\n{title}\n{:<28}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>9}{:>9}{:>9}\n{lines}",
+            "", "p50", "p99", "p99.9", "p99.99", "max", "inside", "/ line", "/ echo", "rounds"
         )
     }
 
@@ -203,6 +208,7 @@ impl Report {
             "chunks_left_out": self.left_out(),
             "machine": self.machine.json(),
             "options": {
+                "only": self.options.only,
                 "rounds": self.options.rounds,
                 "turns": self.options.turns,
                 "seconds": self.options.seconds,
@@ -220,6 +226,12 @@ impl Report {
             value.insert(format!("{name}_ns"), it.figure(quantile).into());
             if let Some(why) = it.noise(quantile, row.is_raw()) {
                 noise.insert(name.to_owned(), why.name().into());
+            }
+        }
+        if !it.inside.is_empty() {
+            for (name, quantile) in FIGURES {
+                let figure = it.inside.value_at_quantile(quantile);
+                value.insert(format!("inside_{name}_ns"), figure.into());
             }
         }
         let ratio = |quantile| echo.map(|echo| it.ratio_to(echo, quantile));
@@ -268,6 +280,3 @@ fn empty_json(row: &Row) -> Value {
 fn tilde(is_noise: bool) -> &'static str {
     if is_noise { "~" } else { "" }
 }
-
-/// How many rows a report has.
-pub const ROWS: usize = CASES.len() * PACES.len();

@@ -41,6 +41,8 @@ pub fn histogram() -> Result<Histogram<u64>, CreationError> {
 pub struct Chunk {
     /// Lengths of the rounds.
     pub rounds: Histogram<u64>,
+    /// What of each the daemon needed from a sample in hand to its estimate sent; empty for what is no daemon.
+    pub inside: Histogram<u64>,
     /// Times at which a round should have begun, but one was still under way.
     pub missed: u64,
     /// How often others took a processor from one of the two sides.
@@ -79,6 +81,8 @@ impl Noise {
 pub struct Distribution {
     /// All rounds.
     pub rounds: Histogram<u64>,
+    /// The daemon's part of them, as in [`Chunk::inside`].
+    pub inside: Histogram<u64>,
     /// The ping-pongs around all chunks.
     pub pings: Histogram<u64>,
     /// Times that were missed.
@@ -95,6 +99,7 @@ impl Distribution {
     fn new() -> Result<Self, CreationError> {
         Ok(Self {
             rounds: histogram()?,
+            inside: histogram()?,
             pings: histogram()?,
             missed: 0,
             preempted: 0,
@@ -105,6 +110,7 @@ impl Distribution {
 
     fn add(&mut self, chunk: &Chunk) -> anyhow::Result<()> {
         self.rounds.add(&chunk.rounds)?;
+        self.inside.add(&chunk.inside)?;
         self.pings.add(&chunk.pings)?;
         self.missed += chunk.missed;
         self.preempted += chunk.preempted;

@@ -20,7 +20,7 @@ use inekf_shared::message::{
     HeadingFix, ImuSample, Message, Odometry2d, Odometry3d, PositionFix, VelocityFix,
 };
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Node, Publisher, TransportError, WakeNotifier};
+use inekf_shared::transport::{self, Node, Outlet, Publisher, TransportError, WakeNotifier};
 
 use super::number::Numbering;
 use crate::dataset::{
@@ -42,12 +42,12 @@ pub struct SendError {
 /// Every sending method returns the number of daemons that got the sample: 0 if none is there.
 /// Sending never waits.
 pub struct Feeder {
-    imu: Publisher<ImuSample>,
-    odometry2d: Publisher<Odometry2d>,
-    odometry3d: Publisher<Odometry3d>,
-    position: Publisher<PositionFix>,
-    velocity: Publisher<VelocityFix>,
-    heading: Publisher<HeadingFix>,
+    imu: Outlet<ImuSample>,
+    odometry2d: Outlet<Odometry2d>,
+    odometry3d: Outlet<Odometry3d>,
+    position: Outlet<PositionFix>,
+    velocity: Outlet<VelocityFix>,
+    heading: Outlet<HeadingFix>,
     wake: WakeNotifier,
     numbering: Numbering,
     _node: Node,
@@ -69,12 +69,12 @@ impl Feeder {
     pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
         let inputs = transport::inputs(&node, instance)?;
         Ok(Self {
-            imu: inputs.imu.publisher()?,
-            odometry2d: inputs.odometry2d.publisher()?,
-            odometry3d: inputs.odometry3d.publisher()?,
-            position: inputs.position.publisher()?,
-            velocity: inputs.velocity.publisher()?,
-            heading: inputs.heading.publisher()?,
+            imu: ready(inputs.imu.publisher()?),
+            odometry2d: ready(inputs.odometry2d.publisher()?),
+            odometry3d: ready(inputs.odometry3d.publisher()?),
+            position: ready(inputs.position.publisher()?),
+            velocity: ready(inputs.velocity.publisher()?),
+            heading: ready(inputs.heading.publisher()?),
             wake: transport::wake(&node, instance)?.notifier()?,
             numbering: Numbering::new(monotonic_ns()),
             _node: node,
@@ -102,7 +102,7 @@ impl Feeder {
     /// [`SendError`].
     pub fn imu(&mut self, row: &ImuRow) -> Result<usize, SendError> {
         let message = self.numbering.imu(row, monotonic_ns());
-        send(&self.imu, &self.wake, message, "imu")
+        send(&mut self.imu, &self.wake, &message, "imu")
     }
 
     /// Sends a planar odometry increment.
@@ -111,7 +111,7 @@ impl Feeder {
     /// [`SendError`].
     pub fn odometry2d(&mut self, row: &Odometry2dRow) -> Result<usize, SendError> {
         let message = self.numbering.odometry2d(row, monotonic_ns());
-        send(&self.odometry2d, &self.wake, message, "odometry2d")
+        send(&mut self.odometry2d, &self.wake, &message, "odometry2d")
     }
 
     /// Sends a spatial odometry increment.
@@ -120,7 +120,7 @@ impl Feeder {
     /// [`SendError`].
     pub fn odometry3d(&mut self, row: &Odometry3dRow) -> Result<usize, SendError> {
         let message = self.numbering.odometry3d(row, monotonic_ns());
-        send(&self.odometry3d, &self.wake, message, "odometry3d")
+        send(&mut self.odometry3d, &self.wake, &message, "odometry3d")
     }
 
     /// Sends a position fix.
@@ -129,7 +129,7 @@ impl Feeder {
     /// [`SendError`].
     pub fn position(&mut self, row: &PositionRow) -> Result<usize, SendError> {
         let message = self.numbering.position(row, monotonic_ns());
-        send(&self.position, &self.wake, message, "position")
+        send(&mut self.position, &self.wake, &message, "position")
     }
 
     /// Sends a velocity fix.
@@ -138,7 +138,7 @@ impl Feeder {
     /// [`SendError`].
     pub fn velocity(&mut self, row: &VelocityRow) -> Result<usize, SendError> {
         let message = self.numbering.velocity(row, monotonic_ns());
-        send(&self.velocity, &self.wake, message, "velocity")
+        send(&mut self.velocity, &self.wake, &message, "velocity")
     }
 
     /// Sends a heading fix.
@@ -147,24 +147,27 @@ impl Feeder {
     /// [`SendError`].
     pub fn heading(&mut self, row: &HeadingRow) -> Result<usize, SendError> {
         let message = self.numbering.heading(row, monotonic_ns());
-        send(&self.heading, &self.wake, message, "heading")
+        send(&mut self.heading, &self.wake, &message, "heading")
     }
 }
 
+/// One slot ready for the next message: its sender loans the one after while this is on its way.
+fn ready<M: Message>(publisher: Publisher<M>) -> Outlet<M> {
+    Outlet::new(publisher, 1)
+}
+
 fn send<M: Message>(
-    publisher: &Publisher<M>,
+    outlet: &mut Outlet<M>,
     wake: &WakeNotifier,
-    message: M,
+    message: &M,
     topic: &'static str,
 ) -> Result<usize, SendError> {
-    let failed = |cause: String| SendError { topic, cause };
-    let receivers = publisher
-        .loan_uninit()
-        .map_err(|error| failed(error.to_string()))?
-        .write_payload(message)
-        .send()
-        .map_err(|error| failed(error.to_string()))?;
+    let receivers = outlet.send(message).map_err(|error| SendError {
+        topic,
+        cause: error.to_string(),
+    })?;
     // A daemon that cannot be woken looks by itself within the bound of its wait.
     let _ = wake.notify();
+    outlet.restock();
     Ok(receivers)
 }

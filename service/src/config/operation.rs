@@ -33,6 +33,12 @@ pub struct Runtime {
     pub wait: WaitMode,
     /// The upper bound of every wait, ms. Used with [`WaitMode::Event`]; short enough to stop in time.
     pub event_timeout_ms: u32,
+    /// The processor it is pinned to; absent: any.
+    pub cpu: Option<u32>,
+    /// Its real-time priority (SCHED_FIFO); absent: an ordinary thread.
+    pub priority: Option<i32>,
+    /// Whether the daemon's memory is locked, so that none of it is ever paged out.
+    pub lock_memory: bool,
 }
 
 impl Late {
@@ -80,6 +86,9 @@ impl Runtime {
         Self {
             wait: runtime.choice("wait", WaitMode::Event),
             event_timeout_ms: runtime.integer("event_timeout_ms", Some("ms"), 1..=50, 10),
+            cpu: runtime.optional_integer("cpu", 0..=1023),
+            priority: runtime.optional_integer("priority", 1..=99),
+            lock_memory: runtime.boolean("lock_memory", false),
         }
     }
 

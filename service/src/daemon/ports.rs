@@ -1,10 +1,6 @@
 //! Every shared-memory port of the daemon, opened before it says that it is ready.
 
-use core::mem::MaybeUninit;
-
 use anyhow::Context;
-use iceoryx2::prelude::ipc;
-use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
     EstimateHead, EstimateMessage, Header, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
@@ -12,7 +8,7 @@ use inekf_shared::message::{
 };
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{
-    self, ControlServer, InputMessage, LatestWriter, Node, PubSub, Publisher, Subscriber,
+    self, ControlServer, InputMessage, LatestWriter, Node, Outlet, PubSub, Publisher, Subscriber,
     TransportError, WakeListener,
 };
 
@@ -118,14 +114,9 @@ fn foreign<M: Model, S: InputMessage>(
 /// Slots kept loaned for estimates to come: one for the sample, one for a fix with it.
 const LOANED_AHEAD: usize = 2;
 
-type Slot<E> = SampleMutUninit<ipc::Service, MaybeUninit<E>, ()>;
-
 /// Where estimates leave: the topic, and the slot with the newest one.
-///
-/// Loaning allocates inside iceoryx2, so it is done ahead, away from the path of a sample.
 pub struct EstimatePort<E: EstimateMessage> {
-    publisher: Publisher<E>,
-    ahead: Vec<Slot<E>>,
+    topic: Outlet<E>,
     latest: LatestWriter<E>,
     /// Estimates that could not be published; the watch reports them.
     pub failures: u64,
@@ -133,41 +124,24 @@ pub struct EstimatePort<E: EstimateMessage> {
 
 impl<E: EstimateMessage> EstimatePort<E> {
     fn new(publisher: Publisher<E>, latest: LatestWriter<E>) -> Self {
-        let mut port = Self {
-            publisher,
-            ahead: Vec::with_capacity(LOANED_AHEAD),
+        Self {
+            topic: Outlet::new(publisher, LOANED_AHEAD),
             latest,
             failures: 0,
-        };
-        port.loan_ahead();
-        port
-    }
-
-    /// Loans slots for the next estimates.
-    fn loan_ahead(&mut self) {
-        while self.ahead.len() < LOANED_AHEAD {
-            match self.publisher.loan_uninit() {
-                Ok(slot) => self.ahead.push(slot),
-                Err(_) => break,
-            }
         }
     }
 }
 
 impl<E: EstimateMessage> Outbox<E> for EstimatePort<E> {
-    fn publish(&mut self, estimate: &E) {
-        let mut stamped = *estimate;
-        stamped.head_mut().published_ns = monotonic_ns();
-        let slot = self
-            .ahead
-            .pop()
-            .or_else(|| self.publisher.loan_uninit().ok());
-        let sent = slot.is_some_and(|slot| slot.write_payload(stamped).send().is_ok());
-        let written = self.latest.write(stamped);
+    fn publish(&mut self, estimate: &mut E) {
+        estimate.head_mut().published_ns = monotonic_ns();
+        let sent = self.topic.send(estimate).is_ok();
+        // Who reads the topic has it by now; the rest is done while it is on its way.
+        let written = self.latest.write(*estimate);
         if !(sent && written) {
             self.failures += 1;
         }
-        self.loan_ahead();
+        self.topic.restock();
     }
 }
 
@@ -199,7 +173,24 @@ impl<M: Model> Ports<M> {
         wait: WaitMode,
         smooths: bool,
     ) -> Result<Self, TransportError> {
-        let node = transport::open_node("inekf-service")?;
+        Self::open_on(
+            transport::open_node("inekf-service")?,
+            instance,
+            wait,
+            smooths,
+        )
+    }
+
+    /// The same on a node of one's own.
+    ///
+    /// # Errors
+    /// [`TransportError`], as [`Ports::open`].
+    pub fn open_on(
+        node: Node,
+        instance: &Instance,
+        wait: WaitMode,
+        smooths: bool,
+    ) -> Result<Self, TransportError> {
         // First of all: there is one server per instance, so a second daemon stops here.
         let control = transport::control(&node, instance)?.server()?;
         let inputs = transport::inputs(&node, instance)?;

@@ -14,12 +14,12 @@ use super::tally::{Refusal, Tally};
 
 /// Where estimates go. The daemon's publishes them; a test's collects them.
 pub trait Outbox<E> {
-    /// Takes one estimate. Must neither block nor allocate in the daemon.
-    fn publish(&mut self, estimate: &E);
+    /// Takes one estimate, whose `published_ns` it may set. Must neither block nor allocate in the daemon.
+    fn publish(&mut self, estimate: &mut E);
 }
 
 impl<E: Copy> Outbox<E> for Vec<E> {
-    fn publish(&mut self, estimate: &E) {
+    fn publish(&mut self, estimate: &mut E) {
         self.push(*estimate);
     }
 }
@@ -160,7 +160,7 @@ impl<E: EstimateMessage> Output<E> {
         head.estimate_seq += 1;
         (head.flags, head.state, head.source) = (flags, state, source);
         head.counters = self.tally.counters;
-        outbox.publish(&self.message);
+        outbox.publish(&mut self.message);
     }
 }
 

@@ -309,6 +309,17 @@ fn each_fault_in_a_table() {
             "runtime.event_timeout_ms",
             &["1 to 50 ms"],
         ),
+        ("[runtime]\ncpu = -1", "runtime.cpu", &["0 to 1023"]),
+        (
+            "[runtime]\npriority = 100",
+            "runtime.priority",
+            &["1 to 99"],
+        ),
+        (
+            "[runtime]\nlock_memory = 1",
+            "runtime.lock_memory",
+            &["true or false"],
+        ),
     ];
     for (tables, key, words) in cases {
         assert_single(&text("", tables), key, words);

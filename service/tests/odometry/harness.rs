@@ -69,7 +69,7 @@ impl Estimate {
 pub struct All(pub Vec<Estimate>);
 
 impl<E: EstimateMessage> Outbox<E> for All {
-    fn publish(&mut self, estimate: &E) {
+    fn publish(&mut self, estimate: &mut E) {
         let any = estimate as &dyn Any;
         let estimate = if let Some(e) = any.downcast_ref::<EstimateSe2>() {
             Estimate {

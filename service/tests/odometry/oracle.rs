@@ -88,7 +88,7 @@ struct Feed<'a>(&'a Recording);
 struct LastOfStamp(Vec<EstimateSe2>);
 
 impl<E: EstimateMessage> Outbox<E> for LastOfStamp {
-    fn publish(&mut self, estimate: &E) {
+    fn publish(&mut self, estimate: &mut E) {
         let estimate = *(estimate as &dyn Any)
             .downcast_ref::<EstimateSe2>()
             .unwrap();

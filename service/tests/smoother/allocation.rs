@@ -11,7 +11,7 @@ use crate::{Fed, full, smoothing};
 struct Latest(EstimateSe23);
 
 impl Outbox<EstimateSe23> for Latest {
-    fn publish(&mut self, estimate: &EstimateSe23) {
+    fn publish(&mut self, estimate: &mut EstimateSe23) {
         self.0 = *estimate;
     }
 }

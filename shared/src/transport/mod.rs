@@ -30,20 +30,16 @@
 //! let listener = transport::wake(&node, &instance)?.listener()?;
 //! transport::reserve_shared_memory(&node)?;
 //!
-//! // Loaning allocates 48 bytes in iceoryx2, so it is done ahead, off the path from input to estimate.
-//! let mut ahead = Some(estimates.loan_uninit()?);
+//! // Loaning allocates in iceoryx2, so the outlet does it ahead, off the path from input to estimate.
+//! let mut estimates = transport::Outlet::new(estimates, 1);
 //! while let Some(sample) = imu.receive()? {
 //!     let received_ns = monotonic_ns();
 //!     let mut estimate = EstimateSe23::ZERO; // here the filter runs
 //!     estimate.head.seq = sample.header.seq;
 //!     estimate.head.received_ns = received_ns;
-//!     let slot = match ahead.take() {
-//!         Some(slot) => slot,
-//!         None => estimates.loan_uninit()?,
-//!     };
-//!     slot.write_payload(estimate).send()?;
+//!     estimates.send(&estimate)?;
 //!     let _written = latest.write(estimate);
-//!     ahead = estimates.loan_uninit().ok();
+//!     estimates.restock();
 //! }
 //! while let Some(request) = server.receive()? {
 //!     request.send_copy(ControlResponse {
@@ -106,6 +102,7 @@ mod error;
 pub mod inspect;
 mod node;
 mod open;
+mod outlet;
 mod reserve;
 mod service;
 
@@ -119,8 +116,9 @@ pub use open::{
     InputMessage, Inputs, control, estimate, estimate_model, health, input, inputs, latest,
     open_latest, smoothed, wake,
 };
+pub use outlet::Outlet;
 pub use reserve::reserve_shared_memory;
 pub use service::{
     Control, ControlClient, ControlServer, Latest, LatestReader, LatestWriter, PubSub, Publisher,
-    Subscriber, Wake, WakeListener, WakeNotifier,
+    Received, Subscriber, Wake, WakeListener, WakeNotifier,
 };

@@ -26,6 +26,8 @@ use crate::qos::{self, PubSubQos};
 pub type Publisher<M> = iceoryx2::port::publisher::Publisher<ipc::Service, M, ()>;
 /// Receives messages.
 pub type Subscriber<M> = iceoryx2::port::subscriber::Subscriber<ipc::Service, M, ()>;
+/// A message in shared memory, held until it is dropped.
+pub type Received<M> = iceoryx2::sample::Sample<ipc::Service, M, ()>;
 /// Receives requests and answers them.
 pub type ControlServer = Server<ipc::Service, ControlRequest, (), ControlResponse, ()>;
 /// Sends requests.

@@ -9,9 +9,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 use inekf::filter::UpdateError;
+use inekf_service::checkpoint::file::Identity;
+use inekf_service::checkpoint::{self, Keeper};
 use inekf_service::config::Config;
-use inekf_service::daemon::{self, Ports};
+use inekf_service::daemon::{self, Ports, Terms};
+use inekf_service::engine::resume::ResumeSettings;
 use inekf_service::engine::{self, Engine, History, Model, Use};
+use inekf_shared::clock::monotonic_ns;
+use inekf_shared::message::EstimateMessage;
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, inspect};
 
@@ -45,6 +50,10 @@ struct Arguments {
     /// Name of this daemon; clients name the same one.
     #[arg(long, value_name = "NAME", default_value = "default")]
     instance: String,
+    /// Take inputs from requests only, one by one, for the replay of a recording: nothing is read from the topics, and
+    /// there are neither checkpoints nor a journal.
+    #[arg(long)]
+    stepped: bool,
 }
 
 #[derive(Subcommand)]
@@ -63,7 +72,7 @@ fn main() -> ExitCode {
     let outcome = match (&arguments.command, &arguments.config) {
         (Some(Command::Check { file }), _) => check(file),
         (Some(Command::Doctor), _) => doctor(),
-        (None, Some(config)) => serve(config, &arguments.instance),
+        (None, Some(config)) => serve(config, &arguments.instance, arguments.stepped),
         (None, None) => Err(anyhow::anyhow!("name a configuration with --config FILE")),
     };
     match outcome {
@@ -114,17 +123,19 @@ fn doctor() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn serve(file: &Path, instance: &str) -> anyhow::Result<()> {
+fn serve(file: &Path, instance: &str, stepped: bool) -> anyhow::Result<()> {
     start_logging();
     let instance = Instance::new(instance)?;
-    let config = Config::load(file)?;
+    let (config, config_text) = Config::load_with_text(file)?;
     let stop = Arc::new(AtomicBool::new(false));
     let signalled = Arc::clone(&stop);
     ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
         .context("installing the handler of SIGINT and SIGTERM")?;
     let daemon = Serve {
         config: &config,
+        config_text: &config_text,
         instance: &instance,
+        stepped,
         stop: &stop,
     };
     engine::build(&config, daemon).map_err(|error| unsolvable(file, &error))?
@@ -138,7 +149,9 @@ fn unsolvable(file: &Path, error: &UpdateError) -> anyhow::Error {
 /// Runs an engine as a daemon.
 struct Serve<'a> {
     config: &'a Config,
+    config_text: &'a str,
     instance: &'a Instance,
+    stepped: bool,
     stop: &'a AtomicBool,
 }
 
@@ -146,7 +159,7 @@ impl Use for Serve<'_> {
     type Output = anyhow::Result<()>;
 
     fn with<M: Model, H: History<M>>(self, engine: Engine<M, H>) -> anyhow::Result<()> {
-        run(engine, self.config, self.instance, self.stop)
+        run(engine, &self)
     }
 }
 
@@ -159,13 +172,42 @@ impl Use for Built {
     fn with<M: Model, H: History<M>>(self, _engine: Engine<M, H>) {}
 }
 
-fn run<M: Model, H: History<M>>(
-    mut engine: Engine<M, H>,
-    config: &Config,
-    instance: &Instance,
-    stop: &AtomicBool,
-) -> anyhow::Result<()> {
-    let mut ports = Ports::open(instance, config.runtime.wait, config.smoother.is_some())?;
+fn run<M: Model, H: History<M>>(mut engine: Engine<M, H>, serve: &Serve<'_>) -> anyhow::Result<()> {
+    let Serve {
+        config,
+        config_text,
+        instance,
+        stepped,
+        stop,
+    } = *serve;
+    let mut ports = Ports::open(
+        instance,
+        config.runtime.wait,
+        config.smoother.is_some(),
+        config.journal.publish && !stepped,
+    )?;
+    let mut terms = Terms {
+        config,
+        config_text,
+        stepped,
+        unused_checkpoint: false,
+    };
+    // After the ports: a second daemon of the instance must not touch the first one's file.
+    let mut keeper = match &config.checkpoint.path {
+        Some(path) if !stepped => {
+            let identity = Identity {
+                instance: instance.to_string(),
+                estimator: config.estimator.to_string(),
+                model: M::Estimate::MODEL,
+                dimension: config.error_states() as u32,
+            };
+            let path = PathBuf::from(path);
+            terms.unused_checkpoint = !resume(&mut engine, &mut ports, config, &path, &identity);
+            let period_ns = config.checkpoint.period_ns();
+            Some(Keeper::start(path, identity, period_ns, monotonic_ns())?)
+        }
+        _ => None,
+    };
     let mut out = std::io::stdout();
     writeln!(
         out,
@@ -176,7 +218,36 @@ fn run<M: Model, H: History<M>>(
     )
     .and_then(|()| out.flush())
     .context("writing the ready line")?;
-    daemon::run(&mut engine, &mut ports, config, stop)
+    let outcome = daemon::run(&mut engine, &mut ports, &terms, keeper.as_mut(), stop);
+    if let Some(keeper) = keeper {
+        keeper.finish(engine.snapshot());
+    }
+    outcome
+}
+
+/// Has the engine continue from the checkpoint, if there is one. False if it is of no use; the log then says why.
+fn resume<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
+    ports: &mut Ports<M>,
+    config: &Config,
+    path: &Path,
+    identity: &Identity,
+) -> bool {
+    let state = match checkpoint::last_state(path, identity) {
+        Ok(Some(state)) => state,
+        Ok(None) => return true,
+        Err(checkpoint::Unused) => return false,
+    };
+    match engine.resume_from(&state, ResumeSettings::new(&config.checkpoint)) {
+        Ok(()) => {
+            ports.journal.resumed(&state);
+            true
+        }
+        Err(reason) => {
+            tracing::warn!("checkpoint not used, starting as configured: {reason}");
+            false
+        }
+    }
 }
 
 /// Logs to standard error: information by default, iceoryx2 only when it warns.

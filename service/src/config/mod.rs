@@ -33,6 +33,7 @@ mod hinf;
 mod imu;
 mod initial;
 mod interval;
+mod keeping;
 mod load;
 mod mismatched;
 mod motion;
@@ -56,6 +57,7 @@ pub use fault::{ConfigFaults, Fault};
 pub use hinf::Hinf;
 pub use imu::Imu;
 pub use initial::Initial;
+pub use keeping::{Checkpoint, Journal};
 pub use load::MAX_FILE_BYTES;
 pub use mismatched::{Mismatched, Wrong};
 pub use motion::{Inertial, Motion, Odometry};
@@ -106,6 +108,10 @@ pub struct Config {
     pub health: Health,
     /// The estimation thread.
     pub runtime: Runtime,
+    /// The newest state on disk.
+    pub checkpoint: Checkpoint,
+    /// The inputs in their order, for a recording.
+    pub journal: Journal,
 }
 
 impl Config {
@@ -168,6 +174,10 @@ impl Config {
             late: root.section("late", Late::read),
             health: root.section("health", Health::read),
             runtime: root.section("runtime", Runtime::read),
+            checkpoint: root.section("checkpoint", |checkpoint| {
+                Checkpoint::read(checkpoint, model)
+            }),
+            journal: root.section("journal", Journal::read),
         }
     }
 }

@@ -7,7 +7,7 @@ use iceoryx2::prelude::ipc;
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
-    EstimateHead, EstimateMessage, Header, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
+    EstimateHead, EstimateMessage, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
     INPUT_ODOMETRY_3D, ImuSample, Odometry2d, Odometry3d, PositionFix, VelocityFix, Zero,
 };
 use inekf_shared::topic::Instance;
@@ -16,6 +16,7 @@ use inekf_shared::transport::{
     TransportError, WakeListener,
 };
 
+use super::journal::JournalPort;
 use super::smoothed::SmoothedPort;
 use crate::config::WaitMode;
 use crate::engine::{MAX_AHEAD_NS, Model, Outbox};
@@ -85,22 +86,24 @@ pub struct Foreign {
 }
 
 impl Foreign {
-    /// Hands every sample that has come to `refuse`, with its `INPUT_*` index.
-    pub fn drain(&self, mut refuse: impl FnMut(usize, &Header)) {
-        drain(&self.imu, INPUT_IMU, &mut refuse);
-        drain(&self.odometry2d, INPUT_ODOMETRY_2D, &mut refuse);
-        drain(&self.odometry3d, INPUT_ODOMETRY_3D, &mut refuse);
+    /// Hands every sample that has come to `refuser`, with its `INPUT_*` index.
+    pub fn drain(&self, refuser: &mut impl Refuser) {
+        drain(&self.imu, INPUT_IMU, refuser);
+        drain(&self.odometry2d, INPUT_ODOMETRY_2D, refuser);
+        drain(&self.odometry3d, INPUT_ODOMETRY_3D, refuser);
     }
 }
 
-fn drain<M: InputMessage>(
-    port: &Option<Subscriber<M>>,
-    input: usize,
-    refuse: &mut impl FnMut(usize, &Header),
-) {
+/// Who refuses the motion samples of other models.
+pub trait Refuser {
+    /// Refuses a sample of the topic with the `INPUT_*` index `input`.
+    fn refuse<S: InputMessage>(&mut self, input: usize, sample: &S);
+}
+
+fn drain<S: InputMessage>(port: &Option<Subscriber<S>>, input: usize, refuser: &mut impl Refuser) {
     let Some(port) = port else { return };
     while let Ok(Some(sample)) = port.receive() {
-        refuse(input, sample.payload().header());
+        refuser.refuse(input, sample.payload());
     }
 }
 
@@ -179,6 +182,8 @@ pub struct Ports<M: Model> {
     pub estimates: EstimatePort<M::Estimate>,
     /// Smoothed states.
     pub smoothed: SmoothedPort,
+    /// What the engine takes.
+    pub journal: JournalPort,
     /// Health, about once a second.
     pub health: Publisher<Health>,
     /// Requests.
@@ -189,7 +194,8 @@ pub struct Ports<M: Model> {
 }
 
 impl<M: Model> Ports<M> {
-    /// Opens every port of `instance` that waiting in this mode needs, and that of smoothed states for a smoother.
+    /// Opens every port of `instance` that waiting in this mode needs, that of smoothed states for a smoother, and the
+    /// journal if it is to be published.
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy. If a daemon of this instance is
@@ -198,6 +204,7 @@ impl<M: Model> Ports<M> {
         instance: &Instance,
         wait: WaitMode,
         smooths: bool,
+        publish_journal: bool,
     ) -> Result<Self, TransportError> {
         let node = transport::open_node("inekf-service")?;
         // First of all: there is one server per instance, so a second daemon stops here.
@@ -227,6 +234,7 @@ impl<M: Model> Ports<M> {
             },
             estimates: EstimatePort::new(estimates, latest),
             smoothed: SmoothedPort::open(&node, instance, smooths)?,
+            journal: JournalPort::open(&node, instance, publish_journal)?,
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,

@@ -75,6 +75,7 @@ fn rows(config: &Config, odometry: &OdometryConfig) -> RowSettings {
         },
         first_period_ns: rows.first_period_ns(),
         noise: odometry.noise.scaled(noise_factor(config)),
+        noise_factor: noise_factor(config),
     }
 }
 

@@ -1,10 +1,11 @@
-//! Requests to a daemon: reset, set state, snapshot, barrier, smoothed window.
+//! Requests to a daemon: reset, set state, snapshot, barrier, smoothed window, pause, noise, configuration.
 
 use std::time::{Duration, Instant};
 
 use inekf_shared::message::{
-    CONTROL_BARRIER, CONTROL_OK, CONTROL_RESET, CONTROL_SET_STATE, CONTROL_SMOOTHED,
-    CONTROL_SNAPSHOT, ControlRequest, ControlResponse, StateVector, Zero, control_kind_name,
+    CONTROL_BARRIER, CONTROL_CONFIG, CONTROL_OK, CONTROL_PAUSE, CONTROL_RELOAD_NOISE,
+    CONTROL_RESET, CONTROL_RESUME, CONTROL_SET_STATE, CONTROL_SMOOTHED, CONTROL_SNAPSHOT,
+    ControlRequest, ControlResponse, ProcessNoise, StateVector, Zero, control_kind_name,
 };
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, ControlClient, Node, TransportError, WakeNotifier};
@@ -37,6 +38,9 @@ pub enum ControlError {
         cause: String,
     },
 }
+
+/// No configuration is longer, bytes.
+const MAX_CONFIG_LEN: usize = 1 << 20;
 
 /// Sends requests and waits for their answers.
 pub struct Controller {
@@ -115,19 +119,81 @@ impl Controller {
         self.request(CONTROL_SMOOTHED, StateVector::ZERO)
     }
 
+    /// Has the daemon take no sample and no fix until [`Controller::unpause`].
+    ///
+    /// # Errors
+    /// [`ControlError`].
+    pub fn pause(&mut self) -> Result<ControlResponse, ControlError> {
+        self.request(CONTROL_PAUSE, StateVector::ZERO)
+    }
+
+    /// Ends a pause.
+    ///
+    /// # Errors
+    /// [`ControlError`].
+    pub fn unpause(&mut self) -> Result<ControlResponse, ControlError> {
+        self.request(CONTROL_RESUME, StateVector::ZERO)
+    }
+
+    /// Uses this process noise from the next sample on.
+    ///
+    /// # Errors
+    /// [`ControlError`]; refused if a number is out of its range.
+    pub fn reload_noise(&mut self, noise: ProcessNoise) -> Result<ControlResponse, ControlError> {
+        self.send(ControlRequest {
+            kind: CONTROL_RELOAD_NOISE,
+            noise,
+            ..ControlRequest::ZERO
+        })
+    }
+
+    /// The text of the daemon's configuration, page by page.
+    ///
+    /// # Errors
+    /// [`ControlError`]; failed if it is no text, or longer than any configuration.
+    pub fn config(&mut self) -> Result<String, ControlError> {
+        let failed = |cause: &str| ControlError::Failed {
+            request: control_kind_name(CONTROL_CONFIG),
+            cause: cause.to_owned(),
+        };
+        let mut text = Vec::new();
+        loop {
+            let response = self.send(ControlRequest {
+                kind: CONTROL_CONFIG,
+                argument: text.len() as u32,
+                ..ControlRequest::ZERO
+            })?;
+            text.extend_from_slice(response.page());
+            if text.len() as u64 >= response.config_len || response.page().is_empty() {
+                break;
+            }
+            if text.len() > MAX_CONFIG_LEN {
+                return Err(failed("the text does not end"));
+            }
+        }
+        String::from_utf8(text).map_err(|_| failed("the configuration is no text"))
+    }
+
     fn request(&mut self, kind: u32, state: StateVector) -> Result<ControlResponse, ControlError> {
-        let request = control_kind_name(kind);
+        self.send(ControlRequest {
+            kind,
+            state,
+            ..ControlRequest::ZERO
+        })
+    }
+
+    /// Sends a request under the next id, and waits for its answer.
+    ///
+    /// # Errors
+    /// [`ControlError`].
+    pub fn send(&mut self, mut asked: ControlRequest) -> Result<ControlResponse, ControlError> {
+        let request = control_kind_name(asked.kind);
         let failed = |cause: String| ControlError::Failed { request, cause };
-        let request_id = self.next_id;
+        asked.request_id = self.next_id;
         self.next_id += 1;
         let pending = self
             .client
-            .send_copy(ControlRequest {
-                kind,
-                request_id,
-                state,
-                ..ControlRequest::ZERO
-            })
+            .send_copy(asked)
             .map_err(|error| failed(error.to_string()))?;
         let _ = self.wake.notify();
         let started = Instant::now();

@@ -37,6 +37,18 @@ impl Daemon {
     /// The program is not found or stops before it is ready; what it wrote to standard error has
     /// gone to this process's.
     pub fn start(config: &Path, instance: &Instance) -> anyhow::Result<Self> {
+        Self::start_with(config, instance, &[])
+    }
+
+    /// The same for a daemon that takes its inputs from requests, one by one.
+    ///
+    /// # Errors
+    /// As [`Daemon::start`].
+    pub fn start_stepped(config: &Path, instance: &Instance) -> anyhow::Result<Self> {
+        Self::start_with(config, instance, &["--stepped"])
+    }
+
+    fn start_with(config: &Path, instance: &Instance, more: &[&str]) -> anyhow::Result<Self> {
         let program = program()?;
         let mut command = Command::new(&program);
         if std::env::var_os("RUST_LOG").is_none() {
@@ -47,6 +59,7 @@ impl Daemon {
             .arg("--config")
             .arg(config)
             .args(["--instance", instance.as_str()])
+            .args(more)
             .stdin(Stdio::null())
             .stdout(Stdio::piped());
         stop_with_this_process(&mut command);

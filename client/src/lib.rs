@@ -6,6 +6,7 @@
 //! * [`simulate`] makes such datasets: analytic trajectories, a MEMS IMU, position, velocity and heading fixes;
 //! * [`model`] says what each model of the daemon is fed and estimates, [`initial`] what state it starts from;
 //! * [`table`] reads and writes the estimate CSV, and holds the CSV reader both share;
+//! * [`noise`] reads the process noise of a configuration, for a request;
 //! * [`evaluate`] compares estimates with the truth;
 //! * [`plot`] draws the comparison as SVG and assembles a report of one HTML file.
 //!
@@ -21,10 +22,12 @@ pub mod feed;
 pub mod initial;
 pub mod live;
 pub mod model;
+pub mod noise;
 pub mod pace;
 pub mod plot;
 pub mod progress;
 pub mod read;
+pub mod recording;
 pub mod replay;
 pub mod rows;
 pub mod session;

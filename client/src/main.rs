@@ -4,16 +4,21 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use anyhow::Context;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use inekf_client::control::Controller;
 use inekf_client::dataset::{Dataset, Odometry, Truth};
 use inekf_client::demo::{DemoOptions, demo};
 use inekf_client::live::feed_live;
+use inekf_client::noise;
 use inekf_client::pace::Speed;
+use inekf_client::recording::replay::require_equal;
+use inekf_client::recording::{Reader, RecordOptions, RerunOptions, record, rerun};
 use inekf_client::replay::{ReplayOptions, replay};
 use inekf_client::simulate::{Scenario, Simulation};
-use inekf_shared::message::{Counters, reason_name};
+use inekf_shared::message::{ControlResponse, Counters, reason_name, state_name};
 use inekf_shared::topic::Instance;
 
 /// Feeds, replays and measures the estimation daemon `inekf-service`.
@@ -26,6 +31,9 @@ Examples:
   inekf-client simulate road-circuit --save circuit
   inekf-client replay circuit --config my.toml --speed max --out estimate.csv
   inekf-client simulate drone-loops --instance drone-7
+  inekf-client record --instance drone-7 --out flight.rec
+  inekf-client replay flight.rec --out again.csv
+  inekf-client control pause --instance drone-7
 
 Exit status: 0 done, 1 failed (one line says why), 2 wrong usage."
 )]
@@ -40,8 +48,13 @@ enum Command {
     Demo(DemoArguments),
     /// Feeds a simulated drive or flight to a daemon in real time, or saves it as a dataset folder.
     Simulate(SimulateArguments),
-    /// Feeds a dataset folder to a daemon and writes its estimates as CSV.
+    /// Feeds a dataset folder to a daemon and writes its estimates as CSV; or replays a recording, whose estimates
+    /// must come again bit for bit.
     Replay(ReplayArguments),
+    /// Records everything that a daemon takes, in its order, and its estimates.
+    Record(RecordArguments),
+    /// Asks something of a daemon.
+    Control(ControlArguments),
 }
 
 #[derive(Args)]
@@ -95,7 +108,8 @@ struct SimulateArguments {
 #[derive(Args)]
 struct ReplayArguments {
     /// The dataset folder: imu.csv or odometry.csv, as the daemon's model needs, and position.csv,
-    /// velocity.csv, heading.csv, meta.json if any.
+    /// velocity.csv, heading.csv, meta.json if any. Or a recording, which brings its configuration: a daemon of its own
+    /// is started with that, and the exit status is 1 if an estimate is not what it was.
     dir: PathBuf,
     /// Start a daemon with this configuration, and stop it afterwards.
     #[arg(long, value_name = "FILE")]
@@ -117,12 +131,54 @@ struct ReplayArguments {
     instance: Instance,
 }
 
+#[derive(Args)]
+struct RecordArguments {
+    /// The daemon; it needs publish = true in its table [journal]. If it does not run yet, it is waited for.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    instance: Instance,
+    /// The recording to write; it must not be there.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// How long, s; by default until SIGINT or SIGTERM.
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+}
+
+#[derive(Args)]
+struct ControlArguments {
+    /// What is asked.
+    action: Action,
+    /// With reload-noise: the configuration whose table [noise] is read.
+    #[arg(required_if_eq("action", "reload-noise"))]
+    file: Option<PathBuf>,
+    /// The daemon.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    instance: Instance,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Action {
+    /// Count samples and fixes, but take none.
+    Pause,
+    /// End a pause.
+    Resume,
+    /// Use the process noise of a configuration file from the next sample on.
+    ReloadNoise,
+    /// Forget the state and initialise anew.
+    Reset,
+    /// Print the state.
+    Snapshot,
+}
+
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match arguments.command {
         Command::Demo(arguments) => run_demo(arguments),
         Command::Simulate(arguments) => run_simulate(arguments),
+        Command::Replay(arguments) if arguments.dir.is_file() => run_rerun(arguments),
         Command::Replay(arguments) => run_replay(arguments),
+        Command::Record(arguments) => run_record(arguments),
+        Command::Control(arguments) => run_control(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -155,16 +211,22 @@ fn run_simulate(arguments: SimulateArguments) -> anyhow::Result<()> {
             return Ok(());
         }
     }
-    let stop = Arc::new(AtomicBool::new(false));
-    let signalled = Arc::clone(&stop);
-    ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
-        .context("installing the handler of SIGINT and SIGTERM")?;
+    let stop = stopped_by_signal()?;
     let summary = feed_live(&dataset, &instance, &|| stop.load(Ordering::Relaxed))?;
     println!(
         "fed      {} samples to {instance}; {} with no daemon there to hear them",
         summary.sent, summary.unheard
     );
     Ok(())
+}
+
+/// Set by SIGINT or SIGTERM.
+fn stopped_by_signal() -> anyhow::Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let signalled = Arc::clone(&stop);
+    ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
+        .context("installing the handler of SIGINT and SIGTERM")?;
+    Ok(stop)
 }
 
 fn contents(dataset: &Dataset) -> String {
@@ -235,6 +297,85 @@ fn run_replay(arguments: ReplayArguments) -> anyhow::Result<()> {
             })
             .collect();
         println!("rejected {rejected}: {}", reasons.join(", "));
+    }
+    Ok(())
+}
+
+fn run_rerun(arguments: ReplayArguments) -> anyhow::Result<()> {
+    if arguments.config.is_some() || arguments.smoothed.is_some() {
+        anyhow::bail!("a recording brings its configuration: leave out --config and --smoothed");
+    }
+    let options = RerunOptions {
+        recording: arguments.dir,
+        out: arguments.out,
+        covariance: arguments.covariance,
+    };
+    let head = Reader::open(&options.recording)?.head().clone();
+    let summary = rerun(&options)?;
+    println!(
+        "replayed {} entries of instance {}: {} rows in {}",
+        summary.entries,
+        head.instance,
+        summary.rows,
+        options.out.display()
+    );
+    for line in summary.lines() {
+        println!("{line}");
+    }
+    require_equal(&summary, &head)
+}
+
+fn run_record(arguments: RecordArguments) -> anyhow::Result<()> {
+    let duration = arguments.duration.map(Duration::try_from_secs_f64);
+    let options = RecordOptions {
+        instance: arguments.instance,
+        out: arguments.out,
+        duration: duration.transpose().context("--duration")?,
+    };
+    let stop = stopped_by_signal()?;
+    let summary = record(&options, &|| stop.load(Ordering::Relaxed))?;
+    println!(
+        "recorded {} entries and {} estimates in {}",
+        summary.entries,
+        summary.estimates,
+        options.out.display()
+    );
+    if summary.first > 0 {
+        println!(
+            "began    at entry {}: the daemon had run before",
+            summary.first
+        );
+    }
+    if summary.entries_missed + summary.estimates_missed > 0 {
+        println!(
+            "missed   {} entries, {} estimates",
+            summary.entries_missed, summary.estimates_missed
+        );
+    }
+    if summary.restarted {
+        println!("ended    because the daemon was started anew");
+    }
+    Ok(())
+}
+
+fn run_control(arguments: &ControlArguments) -> anyhow::Result<()> {
+    let noise = match (arguments.action, &arguments.file) {
+        (Action::ReloadNoise, Some(file)) => Some(noise::load(file)?),
+        (Action::ReloadNoise, None) => anyhow::bail!("reload-noise needs a configuration file"),
+        (_, Some(_)) => anyhow::bail!("a file goes with reload-noise only"),
+        (_, None) => None,
+    };
+    let mut controller = Controller::open(&arguments.instance, Duration::from_secs(5))?;
+    let said = |response: ControlResponse| {
+        println!("ok       the daemon is {}", state_name(response.state_code));
+    };
+    match (arguments.action, noise) {
+        (Action::Pause, _) => said(controller.pause()?),
+        (Action::Resume, _) => said(controller.unpause()?),
+        (Action::Reset, _) => said(controller.reset()?),
+        (Action::Snapshot, _) => println!("{:#?}", controller.snapshot()?),
+        (Action::ReloadNoise, Some(noise)) => said(controller.reload_noise(noise)?),
+        (Action::ReloadNoise, None) => {}
     }
     Ok(())
 }

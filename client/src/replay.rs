@@ -155,7 +155,7 @@ fn feed<E: Estimate>(
 }
 
 /// The estimate CSV under construction. Its header needs the dimension of the first estimate.
-struct Output<E> {
+pub(crate) struct Output<E> {
     path: PathBuf,
     covariance: bool,
     builder: RowBuilder<E>,
@@ -165,7 +165,8 @@ struct Output<E> {
 }
 
 impl<E: Estimate> Output<E> {
-    fn new(path: &Path, covariance: bool) -> anyhow::Result<Self> {
+    /// Creates the file.
+    pub(crate) fn new(path: &Path, covariance: bool) -> anyhow::Result<Self> {
         let file = File::create(path).with_context(|| format!("creating {}", path.display()))?;
         Ok(Self {
             path: path.to_owned(),
@@ -177,7 +178,8 @@ impl<E: Estimate> Output<E> {
         })
     }
 
-    fn take(&mut self, estimate: &E) -> anyhow::Result<()> {
+    /// Takes the next estimate.
+    pub(crate) fn take(&mut self, estimate: &E) -> anyhow::Result<()> {
         match self.builder.push(*estimate) {
             Some(complete) => self.write(&complete),
             None => Ok(()),
@@ -210,7 +212,7 @@ impl<E: Estimate> Output<E> {
     }
 
     /// Writes the last row and returns how many there are.
-    fn finish(mut self) -> anyhow::Result<usize> {
+    pub(crate) fn finish(mut self) -> anyhow::Result<usize> {
         if let Some(last) = std::mem::take(&mut self.builder).finish() {
             self.write(&last)?;
         }

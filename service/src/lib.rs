@@ -6,6 +6,7 @@
 //!
 //! SI units and radians unless a name says otherwise (`_deg`, `_ms`); world frame ENU, body frame FLU.
 
+pub mod checkpoint;
 pub mod config;
 pub mod daemon;
 pub mod engine;

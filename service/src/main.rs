@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 use inekf::filter::UpdateError;
-use inekf_service::config::Config;
-use inekf_service::daemon::{self, Ports};
+use inekf_service::config::{self, Config};
+use inekf_service::daemon::{self, Order};
 use inekf_service::engine::{self, Engine, History, Model, Use};
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, inspect};
@@ -42,9 +42,14 @@ struct Arguments {
     /// The configuration file (TOML).
     #[arg(long, value_name = "FILE", required = true)]
     config: Option<PathBuf>,
-    /// Name of this daemon; clients name the same one.
-    #[arg(long, value_name = "NAME", default_value = "default")]
-    instance: String,
+    /// Name of this daemon; clients name the same one. Many vehicles in one daemon: names and patterns, separated by
+    /// commas, as in "lead,car-{0..99}" [default: those of the configuration's [fleet], else "default"]
+    #[arg(long, value_name = "NAME")]
+    instance: Option<String>,
+    /// Take inputs from requests only, one by one, for the replay of a recording: nothing is read from the topics, and
+    /// there are neither checkpoints nor a journal.
+    #[arg(long)]
+    stepped: bool,
 }
 
 #[derive(Subcommand)]
@@ -63,7 +68,7 @@ fn main() -> ExitCode {
     let outcome = match (&arguments.command, &arguments.config) {
         (Some(Command::Check { file }), _) => check(file),
         (Some(Command::Doctor), _) => doctor(),
-        (None, Some(config)) => serve(config, &arguments.instance),
+        (None, Some(config)) => serve(config, arguments.instance.as_deref(), arguments.stepped),
         (None, None) => Err(anyhow::anyhow!("name a configuration with --config FILE")),
     };
     match outcome {
@@ -114,40 +119,34 @@ fn doctor() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn serve(file: &Path, instance: &str) -> anyhow::Result<()> {
+fn serve(file: &Path, named: Option<&str>, stepped: bool) -> anyhow::Result<()> {
     start_logging();
-    let instance = Instance::new(instance)?;
-    let config = Config::load(file)?;
+    let named = named.map(config::expand).transpose();
+    let named = named.map_err(|problem| anyhow::anyhow!("--instance: {problem}"))?;
+    let (config, config_text) = Config::load_with_text(file)?;
+    let instances = match named {
+        Some(named) => named,
+        None if config.fleet.instances.is_empty() => vec![Instance::default()],
+        None => config.fleet.instances.clone(),
+    };
+    engine::build(&config, Built).map_err(|error| unsolvable(file, &error))?;
     let stop = Arc::new(AtomicBool::new(false));
     let signalled = Arc::clone(&stop);
     ctrlc::set_handler(move || signalled.store(true, Ordering::Relaxed))
         .context("installing the handler of SIGINT and SIGTERM")?;
-    let daemon = Serve {
+    let order = Order {
         config: &config,
-        instance: &instance,
+        config_text: &config_text,
+        instances: &instances,
+        stepped,
         stop: &stop,
     };
-    engine::build(&config, daemon).map_err(|error| unsolvable(file, &error))?
+    daemon::serve(&order, || say_ready(&config, &instances))
 }
 
 /// Why a configuration that reads well cannot be run.
 fn unsolvable(file: &Path, error: &UpdateError) -> anyhow::Error {
     anyhow::anyhow!("{}: {error}", file.display())
-}
-
-/// Runs an engine as a daemon.
-struct Serve<'a> {
-    config: &'a Config,
-    instance: &'a Instance,
-    stop: &'a AtomicBool,
-}
-
-impl Use for Serve<'_> {
-    type Output = anyhow::Result<()>;
-
-    fn with<M: Model, H: History<M>>(self, engine: Engine<M, H>) -> anyhow::Result<()> {
-        run(engine, self.config, self.instance, self.stop)
-    }
 }
 
 /// Nothing but the proof that there is an engine.
@@ -156,28 +155,26 @@ struct Built;
 impl Use for Built {
     type Output = ();
 
-    fn with<M: Model, H: History<M>>(self, _engine: Engine<M, H>) {}
+    fn with<M: Model + 'static, H: History<M> + 'static>(self, _engine: Engine<M, H>) {}
 }
 
-fn run<M: Model, H: History<M>>(
-    mut engine: Engine<M, H>,
-    config: &Config,
-    instance: &Instance,
-    stop: &AtomicBool,
-) -> anyhow::Result<()> {
-    let mut ports = Ports::open(instance, config.runtime.wait, config.smoother.is_some())?;
-    daemon::realtime::apply(&config.runtime);
+/// The line that says that the ports are open.
+fn say_ready(config: &Config, instances: &[Instance]) -> anyhow::Result<()> {
+    let named = match instances {
+        [only] => format!("instance {only}"),
+        [first, .., last] => format!("{} instances, {first} to {last}", instances.len()),
+        [] => "no instance".to_owned(),
+    };
     let mut out = std::io::stdout();
     writeln!(
         out,
-        "ready: instance {instance}, process {}, model {}, wait {}",
+        "ready: {named}, process {}, model {}, wait {}",
         std::process::id(),
         config.model,
         config.runtime.wait,
     )
     .and_then(|()| out.flush())
-    .context("writing the ready line")?;
-    daemon::run(&mut engine, &mut ports, config, stop)
+    .context("writing the ready line")
 }
 
 /// Logs to standard error: information by default, iceoryx2 only when it warns.

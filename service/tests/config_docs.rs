@@ -4,11 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use inekf_service::config::{
-    Axis, Config, Discretisation, Estimator, GapPolicy, HeadingSource, Health, Hinf, HinfGain,
-    Hold, Imu, IncrementNoise, Inertial, InertialNoise, Initial, Invariance, KeySpec, Late, Level,
-    Mismatch, Mismatched, MissingPartner, Model, Motion, Odometry, OdometryNoise, PositionSource,
-    Rows, Runtime, Smoother, Stacking, Transport, Update, VelocitySource, WaitMode, WhiteNoise,
-    Wrong, schema,
+    Axis, Checkpoint, Config, Discretisation, Estimator, Fleet, GapPolicy, HeadingSource, Health,
+    Hinf, HinfGain, Hold, Imu, IncrementNoise, Inertial, InertialNoise, Initial, Invariance,
+    Journal, KeySpec, Late, Level, Mismatch, Mismatched, MissingPartner, Model, Motion, Odometry,
+    OdometryNoise, PositionSource, Rows, Runtime, Smoother, Stacking, Transport, Update,
+    VelocitySource, WaitMode, WhiteNoise, Wrong, schema,
 };
 
 const MINIMAL: &str = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
@@ -386,6 +386,19 @@ fn a_minimal_file_takes_the_documented_defaults() {
             priority: None,
             lock_memory: false,
         },
+        checkpoint: Checkpoint {
+            path: None,
+            period_s: 1.0,
+            max_age_s: 10.0,
+            turn_sigma_rps: 0.2,
+            accel_sigma_mps2: 2.0,
+            speed_sigma_mps: 2.0,
+        },
+        journal: Journal { publish: false },
+        fleet: Fleet {
+            instances: vec![],
+            threads: 1,
+        },
     };
     assert_eq!(Config::from_toml_str(MINIMAL, "minimal").unwrap(), expected);
 
@@ -460,6 +473,12 @@ fn a_minimal_file_of_odometry_takes_the_documented_defaults() {
         late: Late::default(),
         health: Health::default(),
         runtime: Runtime::default(),
+        checkpoint: Checkpoint::default(),
+        journal: Journal::default(),
+        fleet: Fleet {
+            instances: vec![],
+            threads: 1,
+        },
     };
     assert_eq!(config, expected);
 }

@@ -1,6 +1,8 @@
 //! The set-state request: what is taken, what is refused with the state untouched, and from when.
 
 mod common;
+#[path = "engine_set_state/resume.rs"]
+mod resume;
 
 use common::{
     Direct, Engine, Input, PERIOD_NS, all_bits, assert_refused, belief_bits, circle, engine_at,

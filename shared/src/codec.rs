@@ -30,6 +30,15 @@ pub const FRAME_HEADER_LEN: usize = 24;
 /// Longest payload, bytes.
 pub const MAX_PAYLOAD_LEN: usize = 16 * 1024 * 1024;
 
+/// Kind of a frame: a checkpoint of the daemon.
+pub const FRAME_CHECKPOINT: u32 = 1;
+/// Kind of a frame: the beginning of a recording.
+pub const FRAME_RECORDING: u32 = 2;
+/// Kind of a frame: an entry of the journal in a recording.
+pub const FRAME_ENTRY: u32 = 3;
+/// Kind of a frame: an estimate in a recording.
+pub const FRAME_ESTIMATE: u32 = 4;
+
 const CONFIG: Configuration<LittleEndian, Fixint, Limit<MAX_PAYLOAD_LEN>> =
     bincode::config::standard()
         .with_fixed_int_encoding()

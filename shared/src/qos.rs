@@ -68,6 +68,14 @@ pub const HEALTH: PubSubQos = PubSubQos {
     history: 1,
 };
 
+/// The journal: as long as the inputs' own buffers, for the one or two that record it.
+pub const JOURNAL: PubSubQos = PubSubQos {
+    buffer: 4096,
+    publishers: 2,
+    subscribers: 2,
+    history: 0,
+};
+
 /// Limits of the publish-subscribe topic `topic`; `None` for a topic of another kind.
 #[must_use]
 pub const fn pub_sub(topic: Topic) -> Option<PubSubQos> {
@@ -77,6 +85,7 @@ pub const fn pub_sub(topic: Topic) -> Option<PubSubQos> {
         Topic::Estimate => Some(ESTIMATE),
         Topic::Smoothed => Some(SMOOTHED),
         Topic::Health => Some(HEALTH),
+        Topic::Journal => Some(JOURNAL),
         Topic::Latest | Topic::Control | Topic::Wake => None,
     }
 }

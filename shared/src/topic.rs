@@ -96,6 +96,9 @@ pub enum Topic {
     Smoothed,
     /// Health of the daemon, daemon to all.
     Health,
+    /// Everything that the daemon's engine took, in the order in which it took it; daemon to recorders, if it is asked
+    /// to.
+    Journal,
     /// Requests of clients and the daemon's responses.
     Control,
     /// Wakes a daemon that sleeps between inputs; carries no data.
@@ -104,7 +107,7 @@ pub enum Topic {
 
 impl Topic {
     /// Every topic.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Imu,
         Self::Odometry2d,
         Self::Odometry3d,
@@ -115,6 +118,7 @@ impl Topic {
         Self::Latest,
         Self::Smoothed,
         Self::Health,
+        Self::Journal,
         Self::Control,
         Self::Wake,
     ];
@@ -133,6 +137,7 @@ impl Topic {
             Self::Latest => "latest",
             Self::Smoothed => "smoothed",
             Self::Health => "health",
+            Self::Journal => "journal",
             Self::Control => "control",
             Self::Wake => "wake",
         }
@@ -203,6 +208,7 @@ mod tests {
                 "inekf/car-1/latest",
                 "inekf/car-1/smoothed",
                 "inekf/car-1/health",
+                "inekf/car-1/journal",
                 "inekf/car-1/control",
                 "inekf/car-1/wake",
             ]

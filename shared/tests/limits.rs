@@ -105,6 +105,7 @@ fn every_topic_is_created_with_its_limits() {
     let inputs = transport::inputs(&node, &instance()).unwrap();
     let health = transport::health(&node, &instance()).unwrap();
     let smoothed = transport::smoothed(&node, &instance()).unwrap();
+    let journal = transport::journal(&node, &instance()).unwrap();
     let estimate = transport::estimate::<EstimateSe23>(&node, &instance()).unwrap();
     // (buffer, publishers, subscribers, history), as the contract has them.
     check_limits::<ImuSample>(&node, Topic::Imu, [4096, 8, 4, 0]);
@@ -115,8 +116,9 @@ fn every_topic_is_created_with_its_limits() {
     check_limits::<HeadingFix>(&node, Topic::Heading, [1024, 8, 4, 0]);
     check_limits::<EstimateSe23>(&node, Topic::Estimate, [1024, 2, 8, 0]);
     check_limits::<SmoothedState>(&node, Topic::Smoothed, [2048, 2, 8, 0]);
+    check_limits::<JournalEntry>(&node, Topic::Journal, [4096, 2, 2, 0]);
     check_limits::<Health>(&node, Topic::Health, [8, 2, 8, 1]);
-    drop((inputs, health, smoothed, estimate));
+    drop((inputs, health, smoothed, journal, estimate));
 }
 
 fn check_limits<M: Message>(node: &Node, topic: Topic, expected: [usize; 4]) {
@@ -308,7 +310,7 @@ fn another_layout_under_the_same_name_is_a_clear_error() {
     let text = transport::control(&node, &instance())
         .unwrap_err()
         .to_string();
-    for part in ["inekf.ControlResponse.v3", "inekf.Health.v2 (280 bytes"] {
+    for part in ["inekf.ControlResponse.v4", "inekf.Health.v3 (304 bytes"] {
         assert!(text.contains(part), "{text}");
     }
 }

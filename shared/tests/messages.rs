@@ -45,7 +45,9 @@ fn type_names_are_distinct() {
         StateVector,
         ControlRequest,
         ControlResponse,
-        SmoothedState
+        SmoothedState,
+        ProcessNoise,
+        JournalEntry
     );
 }
 
@@ -111,13 +113,14 @@ fn the_triangle_is_numbered_row_by_row() {
 fn every_code_has_a_name_of_its_own_and_an_undefined_one_is_unknown() {
     type Family = (fn(u32) -> &'static str, &'static [u32]);
     let input: fn(u32) -> &'static str = |code| input_name(code as usize);
-    let families: [Family; 8] = [
+    let families: [Family; 9] = [
         (state_name, &[1, 2, 3, 4, 5, 6]),
         (waiting_for_name, &[0, 1, 2, 3, 4]),
         (reason_name, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]),
-        (estimate_flag_name, &[1, 2, 4, 8, 16]),
+        (estimate_flag_name, &[1, 2, 4, 8, 16, 32]),
         (model_name, &[1, 2, 3]),
-        (control_kind_name, &[1, 2, 3, 4, 5]),
+        (control_kind_name, &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10]),
+        (journal_kind_name, &[1, 2, 3, 4, 5, 6, 7, 8, 9]),
         (control_status_name, &[0, 1]),
         (input, &[0, 1, 2, 3, 4, 5]),
     ];
@@ -135,7 +138,8 @@ fn every_code_has_a_name_of_its_own_and_an_undefined_one_is_unknown() {
     }
     assert!((REASON_NOT_READY as usize) < REASONS);
     assert_eq!(INPUT_HEADING + 1, INPUTS);
-    assert_eq!(ESTIMATE_FLAGS, 31);
+    assert_eq!(ESTIMATE_FLAGS, 63);
+    assert_eq!(JOURNAL_HEADING as usize, INPUT_HEADING + 1);
 }
 
 #[test]
@@ -168,6 +172,47 @@ fn whatever_a_faulty_writer_leaves_a_refusal_is_text() {
     assert_eq!(response.reason(), "aaa");
     response.reason[0] = 0x80;
     assert_eq!(response.reason(), "");
+}
+
+#[test]
+fn the_text_of_a_configuration_comes_in_pages() {
+    let text: String = (0..700)
+        .map(|i| char::from(b'a' + (i % 26) as u8))
+        .collect();
+    let (mut response, mut read) = (ControlResponse::default(), Vec::new());
+    for (offset, len) in [(0, 256), (256, 256), (512, 188), (700, 0), (9999, 0)] {
+        response.set_page(&text, offset);
+        assert_eq!((response.page().len(), response.config_len), (len, 700));
+        read.extend_from_slice(response.page());
+    }
+    assert_eq!(read, text.as_bytes());
+    response.reason_len = u32::MAX;
+    assert_eq!(
+        response.page().len(),
+        256,
+        "whatever a faulty writer leaves"
+    );
+}
+
+#[test]
+fn an_entry_of_the_journal_gives_back_the_message_it_was_made_of_and_no_other() {
+    let mut fix = PositionFix::default();
+    (fix.header.seq, fix.source, fix.position_w_m[2]) = (7, 3, -0.5);
+    let entry = JournalEntry::new(5, 9, JOURNAL_POSITION, fix.as_bytes());
+    assert_eq!(
+        (entry.index, entry.estimates, entry.kind),
+        (5, 9, JOURNAL_POSITION)
+    );
+    assert_eq!(entry.read::<PositionFix>(), Some(fix));
+    assert_eq!(entry.read::<ImuSample>(), None);
+    assert_eq!(entry.read::<ControlRequest>(), None);
+    let faulty = JournalEntry {
+        size: u32::MAX,
+        ..entry
+    };
+    assert_eq!(faulty.message().len(), JOURNAL_PAYLOAD_LEN);
+    let cut = JournalEntry::new(0, 0, JOURNAL_CONTROL, &[1; 2 * JOURNAL_PAYLOAD_LEN]);
+    assert_eq!(cut.message(), [1; JOURNAL_PAYLOAD_LEN]);
 }
 
 #[test]

@@ -3,15 +3,15 @@
 use inekf_client::control::ControlError;
 use inekf_client::simulate::{InitialOptions, SimulationOptions};
 use inekf_shared::message::{
-    ESTIMATE_RESET, EstimateSe23, MODEL_ODOMETRY_2D, STATE_ALIGNING, STATE_RUNNING, STATE_WAITING,
-    StateVector, WAITING_FOR_IMU, WAITING_FOR_LEVEL, WAITING_FOR_POSITION, WAITING_FOR_REQUEST,
-    triangle_index,
+    CONTROL_TAKE, ControlRequest, ESTIMATE_RESET, EstimateSe23, MODEL_ODOMETRY_2D,
+    REASON_NOT_READY, STATE_ALIGNING, STATE_PAUSED, STATE_RUNNING, STATE_WAITING, StateVector,
+    WAITING_FOR_IMU, WAITING_FOR_LEVEL, WAITING_FOR_POSITION, WAITING_FOR_REQUEST, triangle_index,
 };
 use inekf_tests::drive::{CONFIG, drive, options, simulated};
 use inekf_tests::in_process::{self, initial_state, shifted};
 use inekf_tests::link::{Link, latest};
 use inekf_tests::memory::Memory;
-use inekf_tests::process::Daemon;
+use inekf_tests::process::{Daemon, client, config_file};
 use inekf_tests::score::{SECOND_NS, assert_same, assert_same_states, bits};
 
 /// A state as a snapshot gives it, as an estimate has it.
@@ -212,6 +212,70 @@ fn a_daemon_that_waits_for_a_state_starts_from_the_one_it_is_given() {
     let mut expected = Vec::new();
     in_process::run(&dataset, &config, &mut expected);
     assert_same(&estimates, &expected);
+    drop(link);
+    daemon.stop();
+    memory.assert_nothing_left();
+}
+
+#[test]
+fn a_pause_is_said_and_counted_and_other_noise_is_checked_like_the_configuration() {
+    let memory = Memory::new();
+    let daemon = Daemon::start(&memory, "car", CONFIG);
+    let mut link = Link::open(&memory, "car");
+    let dataset = drive(7, 6.0);
+    let rows: Vec<_> = dataset.events().collect();
+    let mut parts = rows.chunks(rows.len().div_ceil(3));
+    let mut next = |link: &mut Link| link.feed(parts.next().unwrap().iter().copied());
+    let ask = |action: &[&str]| {
+        client(
+            &memory,
+            [&["control", "--instance", "car"], action].concat(),
+        )
+    };
+
+    assert!(!next(&mut link).is_empty());
+    let ended = ask(&["pause"]).succeeded();
+    assert_eq!(ended.stdout, "ok       the daemon is paused\n");
+    assert_eq!(next(&mut link).len(), 0);
+    let answer = link.controller.barrier().unwrap();
+    assert_eq!(answer.state_code, STATE_PAUSED);
+    assert!(answer.rejected_by_reason[REASON_NOT_READY as usize] > 200);
+    assert!(ask(&["snapshot"]).succeeded().stdout.contains("p_w_m"));
+    let ended = ask(&["resume"]).succeeded();
+    assert_eq!(ended.stdout, "ok       the daemon is running\n");
+
+    let file = |text: &str| {
+        let (folder, file) = config_file(text);
+        (folder, file.to_str().unwrap().to_owned())
+    };
+    let (_kept, good) = file("[noise]\ngyro_density = 1e-3\naccel_density = 1e-2\n");
+    ask(&["reload-noise", &good]).succeeded();
+    for (text, word) in [
+        (
+            "[noise]\ngyro_density = 11.0\naccel_density = 1e-2\n",
+            "gyroscope",
+        ),
+        (
+            "[noise]\nrotation_density = 1.0\ntranslation_density = 1.0\nlateral_density = 1.0\n",
+            "other kind",
+        ),
+        ("[noise]\ngyro_density = 1e-3\n", "both densities"),
+        ("[nose]\n", "no table [noise]"),
+    ] {
+        let (_kept, bad) = file(text);
+        let ended = ask(&["reload-noise", &bad]);
+        assert!(ended.failed_with_one_line(1).contains(word), "{ended:?}");
+    }
+    assert_eq!(ask(&["reload-noise"]).status.code(), Some(2));
+    // Samples are taken again: after two seconds of silence, as after any gap.
+    assert!(!next(&mut link).is_empty());
+    let reason = refusal(link.controller.send(ControlRequest {
+        kind: CONTROL_TAKE,
+        argument: 1,
+        ..ControlRequest::default()
+    }));
+    assert!(reason.contains("--stepped"), "{reason}");
+    assert!(ask(&["reset"]).succeeded().stdout.contains("waiting"));
     drop(link);
     daemon.stop();
     memory.assert_nothing_left();

@@ -1,6 +1,9 @@
 //! Real processes over real shared memory: a daemon, feeders that come and go or are killed, readers that sleep. The
 //! estimates stay right, and nothing is left when all have gone.
 
+#[path = "process/checkpoint.rs"]
+mod checkpoint;
+
 use std::time::{Duration, Instant};
 
 use inekf_client::dataset::{Dataset, Truth, TruthRow};

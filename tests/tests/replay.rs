@@ -1,6 +1,9 @@
 //! `inekf-client replay` with a daemon of its own: it loses nothing, and folder and configuration alone decide every
 //! byte. The oracle is the same engine in this process, fed row by row.
 
+#[path = "replay/journal.rs"]
+mod journal;
+
 use std::collections::BTreeSet;
 
 use inekf_client::dataset::{Dataset, Event, Initial, PositionRow};

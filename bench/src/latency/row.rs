@@ -249,6 +249,7 @@ mod tests {
         };
         Chunk {
             rounds: of(rounds),
+            inside: of(&[]),
             missed: 1,
             preempted: 2,
             pings: of(pings),

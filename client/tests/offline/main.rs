@@ -2,6 +2,7 @@
 
 mod dataset;
 mod evaluate;
+mod journal;
 mod meta;
 mod models;
 mod planar;

@@ -22,12 +22,19 @@ impl Config {
     ///
     /// Every fault of the file; or one, if it cannot be read, is larger than [`MAX_FILE_BYTES`] or is not UTF-8.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, ConfigFaults> {
+        Ok(Self::load_with_text(path)?.0)
+    }
+
+    /// The same with the text of the file.
+    ///
+    /// # Errors
+    ///
+    /// As [`Config::load`].
+    pub fn load_with_text(path: impl AsRef<Path>) -> Result<(Self, String), ConfigFaults> {
         let path = path.as_ref();
         let origin = path.display().to_string();
-        match read_text(path) {
-            Ok(text) => Self::from_toml_str(&text, &origin),
-            Err(fault) => Err(ConfigFaults::new(&origin, vec![*fault])),
-        }
+        let text = read_text(path).map_err(|fault| ConfigFaults::new(&origin, vec![*fault]))?;
+        Ok((Self::from_toml_str(&text, &origin)?, text))
     }
 
     /// Reads `text`; `origin_name` is what messages call it.

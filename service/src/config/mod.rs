@@ -29,10 +29,12 @@
 mod choice;
 mod estimator;
 mod fault;
+mod fleet;
 mod hinf;
 mod imu;
 mod initial;
 mod interval;
+mod keeping;
 mod load;
 mod mismatched;
 mod motion;
@@ -53,9 +55,11 @@ pub use choice::{
     Mismatch, MismatchKind, MissingPartner, Model, Parametrisation, Prior, Transport, WaitMode,
 };
 pub use fault::{ConfigFaults, Fault};
+pub use fleet::{Fleet, MAX_VEHICLES, expand};
 pub use hinf::Hinf;
 pub use imu::Imu;
 pub use initial::Initial;
+pub use keeping::{Checkpoint, Journal};
 pub use load::MAX_FILE_BYTES;
 pub use mismatched::{Mismatched, Wrong};
 pub use motion::{Inertial, Motion, Odometry};
@@ -106,6 +110,12 @@ pub struct Config {
     pub health: Health,
     /// The estimation thread.
     pub runtime: Runtime,
+    /// The newest state on disk.
+    pub checkpoint: Checkpoint,
+    /// The inputs in their order, for a recording.
+    pub journal: Journal,
+    /// The vehicles, if they are many.
+    pub fleet: Fleet,
 }
 
 impl Config {
@@ -168,6 +178,11 @@ impl Config {
             late: root.section("late", Late::read),
             health: root.section("health", Health::read),
             runtime: root.section("runtime", Runtime::read),
+            checkpoint: root.section("checkpoint", |checkpoint| {
+                Checkpoint::read(checkpoint, model)
+            }),
+            journal: root.section("journal", Journal::read),
+            fleet: root.section("fleet", Fleet::read),
         }
     }
 }

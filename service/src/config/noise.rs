@@ -1,6 +1,7 @@
 //! `[noise]`: process noise, in the keys of the model; those of another model are refused.
 
 mod inertial;
+mod numbers;
 mod odometry;
 
 pub use inertial::{InertialNoise, WhiteNoise};

@@ -237,6 +237,23 @@ impl<'w, 'a> Section<'w, 'a> {
         self.read_vector3(&spec, allowed, lengths)
     }
 
+    /// A text that may be absent, but not empty; `allowed` says what it is.
+    pub(super) fn optional_text(
+        &mut self,
+        name: &'static str,
+        allowed: &'static str,
+    ) -> Option<String> {
+        let spec = self.declare(name, None, "none".to_owned(), allowed.to_owned());
+        let (place, value) = self.entry(name)?;
+        match value {
+            DeValue::String(text) if text.is_empty() => {
+                self.fault(&place, "must not be empty", &spec)
+            }
+            DeValue::String(text) => Some(text.clone().into_owned()),
+            other => self.mistyped(&place, "a text in quotes", other, &spec),
+        }
+    }
+
     /// Two different whole numbers, which the document must give. None only if a fault was noted.
     pub(super) fn required_pair<T>(
         &mut self,

@@ -1,11 +1,20 @@
-//! Answers to control requests: reset, set state, snapshot, barrier, smoothed window.
+//! Answers to control requests: reset, set state, snapshot, barrier, smoothed window, pause, noise, configuration; and
+//! an entry of a journal, in a daemon that is fed by requests.
 
+use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
-    CONTROL_BARRIER, CONTROL_OK, CONTROL_REFUSED, CONTROL_RESET, CONTROL_SET_STATE,
-    CONTROL_SMOOTHED, CONTROL_SNAPSHOT, ControlRequest, ControlResponse, StateVector, Zero,
+    CONTROL_BARRIER, CONTROL_CONFIG, CONTROL_OK, CONTROL_PAUSE, CONTROL_REFUSED,
+    CONTROL_RELOAD_NOISE, CONTROL_RESET, CONTROL_RESUME, CONTROL_SET_STATE, CONTROL_SMOOTHED,
+    CONTROL_SNAPSHOT, CONTROL_TAKE, ControlRequest, ControlResponse, Header, JOURNAL_HEADING,
+    JOURNAL_IMU, JOURNAL_ODOMETRY_2D, JOURNAL_ODOMETRY_3D, JOURNAL_POSITION, JOURNAL_RESUME,
+    JOURNAL_SETTLE, JOURNAL_VELOCITY, Message, REASON_WRONG_MODEL, StateVector, Zero,
 };
 
+use super::ports::EstimatePort;
 use super::smoothed::SmoothedPort;
+use super::vehicle::Terms;
+use crate::engine::resume::ResumeSettings;
+use crate::engine::tally::Refusal;
 use crate::engine::{Engine, History, Model};
 
 /// Does what `request` asks, and answers. Whatever its bytes are, a refusal says why.
@@ -14,23 +23,39 @@ use crate::engine::{Engine, History, Model};
 pub fn answer<M: Model, H: History<M>>(
     engine: &mut Engine<M, H>,
     request: &ControlRequest,
+    terms: &Terms<'_>,
+    estimates: &mut EstimatePort<M::Estimate>,
     smoothed: &mut SmoothedPort,
 ) -> ControlResponse {
     let mut published = 0;
+    let nothing = StateVector::ZERO;
     let outcome = match request.kind {
         CONTROL_RESET => {
             engine.reset();
-            Ok(StateVector::ZERO)
+            Ok(nothing)
         }
-        CONTROL_SET_STATE => engine.set_state(&request.state).map(|()| StateVector::ZERO),
+        CONTROL_SET_STATE => engine.set_state(&request.state).map(|()| nothing),
         CONTROL_SNAPSHOT => engine
             .snapshot()
             .ok_or("there is no state yet: the daemon is not initialised"),
-        CONTROL_BARRIER => Ok(StateVector::ZERO),
+        CONTROL_BARRIER | CONTROL_CONFIG => Ok(nothing),
         CONTROL_SMOOTHED => smoothed.answer(engine, request.request_id).map(|count| {
             published = count;
-            StateVector::ZERO
+            nothing
         }),
+        CONTROL_PAUSE => {
+            engine.pause();
+            Ok(nothing)
+        }
+        CONTROL_RESUME => {
+            engine.unpause();
+            Ok(nothing)
+        }
+        CONTROL_RELOAD_NOISE => engine.reload_noise(&request.noise).map(|()| nothing),
+        CONTROL_TAKE if terms.stepped => take(engine, request, terms, estimates).map(|()| nothing),
+        CONTROL_TAKE => Err(
+            "this daemon takes its inputs from their topics: start one with --stepped to feed it by requests",
+        ),
         _ => Err("the kind of request is unknown to this version"),
     };
     let (state_code, waiting_for) = engine.state();
@@ -53,5 +78,46 @@ pub fn answer<M: Model, H: History<M>>(
             response.set_reason(reason);
         }
     }
+    if request.kind == CONTROL_CONFIG {
+        response.set_page(terms.config_text, request.argument as usize);
+    }
     response
+}
+
+/// Gives the engine the entry of a journal that `request` holds.
+fn take<M: Model, H: History<M>>(
+    engine: &mut Engine<M, H>,
+    request: &ControlRequest,
+    terms: &Terms<'_>,
+    estimates: &mut EstimatePort<M::Estimate>,
+) -> Result<(), &'static str> {
+    match request.argument {
+        kind @ (JOURNAL_IMU | JOURNAL_ODOMETRY_2D | JOURNAL_ODOMETRY_3D) => {
+            let input = kind as usize - 1;
+            if input == M::INPUT {
+                engine.sample(&input_of(request)?, monotonic_ns(), estimates);
+            } else {
+                let header: Header = input_of(request)?;
+                engine.refuse(input, &header, Refusal(REASON_WRONG_MODEL));
+            }
+        }
+        JOURNAL_POSITION => engine.position(&input_of(request)?, estimates),
+        JOURNAL_VELOCITY => engine.velocity(&input_of(request)?, estimates),
+        JOURNAL_HEADING => engine.heading(&input_of(request)?, estimates),
+        JOURNAL_SETTLE => engine.settle(estimates),
+        JOURNAL_RESUME => {
+            let settings = ResumeSettings::new(&terms.config.checkpoint);
+            engine.resume_from(&request.state, settings)?;
+        }
+        _ => return Err("the kind of the entry is unknown to this version"),
+    }
+    Ok(())
+}
+
+/// The message at the front of the request's bytes.
+fn input_of<T: Message>(request: &ControlRequest) -> Result<T, &'static str> {
+    let front = request.input.get(..size_of::<T>());
+    front
+        .and_then(T::from_bytes)
+        .ok_or("the message is longer than a request holds")
 }

@@ -1,15 +1,20 @@
-//! The daemon: the engine between shared-memory ports.
+//! The daemon: engines between shared-memory ports.
 //!
-//! [`ports`] opens everything, [`mod@run`] is the estimation loop, [`control`] answers requests,
-//! [`smoothed`] publishes what leaves a smoother's window, [`watch`] keeps the health message and reports changes to the log,
-//! [`realtime`] asks the system for a processor, priority and memory.
+//! [`fleet`] opens the vehicles and gives them threads, [`mod@run`] is a thread's loop, [`vehicle`] what it does with each.
+//! [`ports`] are a vehicle's ports, [`control`] answers requests, [`journal`] publishes what the engine takes, [`smoothed`]
+//! what leaves a smoother's window; [`watch`] keeps the health message and reports changes to the log, [`realtime`] asks
+//! the system for a processor, priority and memory.
 
 pub mod control;
+pub mod fleet;
+pub mod journal;
 pub mod ports;
 pub mod realtime;
 pub mod run;
 pub mod smoothed;
+pub mod vehicle;
 pub mod watch;
 
+pub use fleet::{Order, serve};
 pub use ports::Ports;
-pub use run::run;
+pub use vehicle::{Terms, Vehicle};

@@ -3,7 +3,7 @@
 use anyhow::Context;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
-    EstimateHead, EstimateMessage, Header, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
+    EstimateHead, EstimateMessage, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
     INPUT_ODOMETRY_3D, ImuSample, Odometry2d, Odometry3d, PositionFix, VelocityFix, Zero,
 };
 use inekf_shared::topic::Instance;
@@ -12,8 +12,9 @@ use inekf_shared::transport::{
     TransportError, WakeListener,
 };
 
+use super::journal::JournalPort;
 use super::smoothed::SmoothedPort;
-use crate::config::WaitMode;
+use crate::config::{Config, Motion, WaitMode};
 use crate::engine::{MAX_AHEAD_NS, Model, Outbox};
 
 /// An aiding topic, read in step with the samples: a fix that is ahead of them is held back, and
@@ -22,14 +23,21 @@ use crate::engine::{MAX_AHEAD_NS, Model, Outbox};
 pub struct FixPort<M: InputMessage> {
     subscriber: Subscriber<M>,
     held: Option<M>,
+    is_used: bool,
 }
 
 impl<M: InputMessage + Copy> FixPort<M> {
-    fn new(subscriber: Subscriber<M>) -> Self {
+    fn new(subscriber: Subscriber<M>, is_used: bool) -> Self {
         Self {
             subscriber,
             held: None,
+            is_used,
         }
+    }
+
+    /// Whether a source is configured. What comes without one is refused, so no sample has to wait for a look at it.
+    pub fn is_used(&self) -> bool {
+        self.is_used
     }
 
     /// The next fix with a stamp up to `horizon_ns`, or one so far ahead that its clock cannot be
@@ -37,7 +45,22 @@ impl<M: InputMessage + Copy> FixPort<M> {
     ///
     /// # Errors
     /// The port failed.
+    #[inline]
     pub fn next_until(&mut self, horizon_ns: u64) -> anyhow::Result<Option<M>> {
+        // Nearly always there is nothing, and a sample waits for this answer.
+        if self.held.is_none() && !self.has_message()? {
+            return Ok(None);
+        }
+        self.take_until(horizon_ns)
+    }
+
+    fn has_message(&self) -> anyhow::Result<bool> {
+        let has = self.subscriber.has_samples();
+        has.with_context(|| format!("looking at {:?}", M::TOPIC))
+    }
+
+    #[inline(never)]
+    fn take_until(&mut self, horizon_ns: u64) -> anyhow::Result<Option<M>> {
         let next = match self.held.take() {
             Some(held) => Some(held),
             None => self
@@ -81,22 +104,24 @@ pub struct Foreign {
 }
 
 impl Foreign {
-    /// Hands every sample that has come to `refuse`, with its `INPUT_*` index.
-    pub fn drain(&self, mut refuse: impl FnMut(usize, &Header)) {
-        drain(&self.imu, INPUT_IMU, &mut refuse);
-        drain(&self.odometry2d, INPUT_ODOMETRY_2D, &mut refuse);
-        drain(&self.odometry3d, INPUT_ODOMETRY_3D, &mut refuse);
+    /// Hands every sample that has come to `refuser`, with its `INPUT_*` index.
+    pub fn drain(&self, refuser: &mut impl Refuser) {
+        drain(&self.imu, INPUT_IMU, refuser);
+        drain(&self.odometry2d, INPUT_ODOMETRY_2D, refuser);
+        drain(&self.odometry3d, INPUT_ODOMETRY_3D, refuser);
     }
 }
 
-fn drain<M: InputMessage>(
-    port: &Option<Subscriber<M>>,
-    input: usize,
-    refuse: &mut impl FnMut(usize, &Header),
-) {
+/// Who refuses the motion samples of other models.
+pub trait Refuser {
+    /// Refuses a sample of the topic with the `INPUT_*` index `input`.
+    fn refuse<S: InputMessage>(&mut self, input: usize, sample: &S);
+}
+
+fn drain<S: InputMessage>(port: &Option<Subscriber<S>>, input: usize, refuser: &mut impl Refuser) {
     let Some(port) = port else { return };
     while let Ok(Some(sample)) = port.receive() {
-        refuse(input, sample.payload().header());
+        refuser.refuse(input, sample.payload());
     }
 }
 
@@ -153,6 +178,8 @@ pub struct Ports<M: Model> {
     pub estimates: EstimatePort<M::Estimate>,
     /// Smoothed states.
     pub smoothed: SmoothedPort,
+    /// What the engine takes.
+    pub journal: JournalPort,
     /// Health, about once a second.
     pub health: Publisher<Health>,
     /// Requests.
@@ -163,34 +190,18 @@ pub struct Ports<M: Model> {
 }
 
 impl<M: Model> Ports<M> {
-    /// Opens every port of `instance` that waiting in this mode needs, and that of smoothed states for a smoother.
+    /// Opens every port of `instance` that this configuration needs; a `stepped` daemon publishes no journal.
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy. If a daemon of this instance is
     /// running, the error names its process id.
-    pub fn open(
-        instance: &Instance,
-        wait: WaitMode,
-        smooths: bool,
-    ) -> Result<Self, TransportError> {
-        Self::open_on(
-            transport::open_node("inekf-service")?,
-            instance,
-            wait,
-            smooths,
-        )
-    }
-
-    /// The same on a node of one's own.
-    ///
-    /// # Errors
-    /// [`TransportError`], as [`Ports::open`].
     pub fn open_on(
         node: Node,
         instance: &Instance,
-        wait: WaitMode,
-        smooths: bool,
+        config: &Config,
+        stepped: bool,
     ) -> Result<Self, TransportError> {
+        let publish_journal = config.journal.publish && !stepped;
         // First of all: there is one server per instance, so a second daemon stops here.
         let control = transport::control(&node, instance)?.server()?;
         let inputs = transport::inputs(&node, instance)?;
@@ -199,9 +210,17 @@ impl<M: Model> Ports<M> {
         *nothing_yet.head_mut() = EstimateHead::UNSTARTED;
         let latest = transport::latest(&node, instance, nothing_yet)?.writer()?;
         let wake = transport::wake(&node, instance)?;
-        let wake = match wait {
+        let wake = match config.runtime.wait {
             WaitMode::Event => Some(wake.listener()?),
             WaitMode::Spin => None,
+        };
+        let uses_position = !config.position_sources.is_empty();
+        let (uses_velocity, uses_heading) = match &config.motion {
+            Motion::Inertial(inertial) => (
+                !inertial.velocity_sources.is_empty(),
+                !inertial.heading_sources.is_empty(),
+            ),
+            Motion::Odometry(_) => (false, false),
         };
         let foreign = Foreign {
             imu: foreign::<M, _>(&inputs.imu, INPUT_IMU)?,
@@ -211,13 +230,14 @@ impl<M: Model> Ports<M> {
         let ports = Self {
             inputs: Inputs {
                 samples: transport::input::<M::Sample>(&node, instance)?.subscriber()?,
-                position: FixPort::new(inputs.position.subscriber()?),
-                velocity: FixPort::new(inputs.velocity.subscriber()?),
-                heading: FixPort::new(inputs.heading.subscriber()?),
+                position: FixPort::new(inputs.position.subscriber()?, uses_position),
+                velocity: FixPort::new(inputs.velocity.subscriber()?, uses_velocity),
+                heading: FixPort::new(inputs.heading.subscriber()?, uses_heading),
                 foreign,
             },
             estimates: EstimatePort::new(estimates, latest),
-            smoothed: SmoothedPort::open(&node, instance, smooths)?,
+            smoothed: SmoothedPort::open(&node, instance, config.smoother.is_some())?,
+            journal: JournalPort::open(&node, instance, publish_journal)?,
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,

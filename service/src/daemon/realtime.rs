@@ -8,13 +8,14 @@ use tracing::{info, warn};
 
 use crate::config::Runtime;
 
-/// Applies the `[runtime]` options to the calling thread. Call it once the ports are open: the memory that is locked
-/// is that which is mapped by then.
+/// Applies the `[runtime]` options to the calling thread, the `index`th of the daemon's, which gets the processor so many
+/// after the first one's. Call it once the ports are open: the memory that is locked is that which is mapped by then.
 ///
 /// A reader that attaches later is mapped later, and that mapping is not locked; its memory is shared memory that
 /// exists already.
-pub fn apply(runtime: &Runtime) {
-    if let Some(cpu) = runtime.cpu {
+pub fn apply(runtime: &Runtime, index: usize) {
+    if let Some(first) = runtime.cpu {
+        let cpu = first as usize + index;
         note(
             format!("running on processor {cpu} only"),
             "does this machine, and this process's cpuset, have it?",
@@ -44,8 +45,7 @@ fn note(what: String, remedy: &str, outcome: anyhow::Result<()>) {
     }
 }
 
-fn pin(cpu: u32) -> anyhow::Result<()> {
-    let cpu = cpu as usize;
+fn pin(cpu: usize) -> anyhow::Result<()> {
     anyhow::ensure!(
         cpu < CpuSet::MAX_CPU,
         "the system numbers processors up to {}",

@@ -7,6 +7,7 @@ use inekf_shared::message::{
 };
 use tracing::{info, warn};
 
+use crate::engine::resume::Resumption;
 use crate::engine::tally::Tally;
 
 /// What the loop knows at one moment.
@@ -22,6 +23,16 @@ pub struct Moment {
     pub last_sample_ns: u64,
     /// Estimates that could not be published.
     pub failures: u64,
+    /// `HEALTH_*` flags.
+    pub flags: u32,
+    /// What became of the checkpoint of an earlier life.
+    pub resumption: Resumption,
+    /// Checkpoints written.
+    pub checkpoints: u64,
+    /// Checkpoints that could not be written; their writer says why.
+    pub checkpoint_failures: u64,
+    /// Entries of the journal that could not be published.
+    pub journal_failures: u64,
 }
 
 /// Makes the health messages.
@@ -35,6 +46,7 @@ pub struct Watch {
     arrivals_at_last: u64,
     said: (u32, u32),
     failures_said: u64,
+    resumption_said: Resumption,
 }
 
 impl Watch {
@@ -49,6 +61,7 @@ impl Watch {
             arrivals_at_last: 0,
             said: (0, 0),
             failures_said: 0,
+            resumption_said: Resumption::None,
         }
     }
 
@@ -74,7 +87,9 @@ impl Watch {
         if silent && matches!(state, STATE_RUNNING | STATE_DEGRADED) {
             state = STATE_STALE;
         }
-        self.log((state, waiting_for), moment.failures, tally);
+        let failures = moment.failures + moment.journal_failures;
+        self.log((state, waiting_for), failures, tally);
+        self.log_resumption(moment.resumption);
         Health {
             stamp_ns: moment.now_ns,
             uptime_ns: moment.now_ns - self.started_ns,
@@ -82,12 +97,40 @@ impl Watch {
             state,
             waiting_for,
             model: moment.model,
-            flags: 0,
+            flags: moment.flags,
             last_imu_stamp_ns: moment.last_sample_ns,
             imu_rate_hz,
             counters: tally.counters,
             rejected_by_reason: tally.rejected_by_reason,
             received: tally.received,
+            checkpoints: moment.checkpoints,
+            checkpoint_failures: moment.checkpoint_failures,
+            journal_failures: moment.journal_failures,
+        }
+    }
+
+    fn log_resumption(&mut self, now: Resumption) {
+        if core::mem::replace(&mut self.resumption_said, now) == now {
+            return;
+        }
+        let seconds = |ns: u64| ns as f64 * 1e-9;
+        match now {
+            Resumption::None | Resumption::Waiting => {}
+            Resumption::Resumed { age_ns } => {
+                info!(age_s = seconds(age_ns), "resumed from the checkpoint");
+            }
+            Resumption::TooOld { age_ns } => warn!(
+                age_s = seconds(age_ns),
+                "checkpoint not used, starting as configured: it is older than max_age_s"
+            ),
+            Resumption::FromFuture { ahead_ns } => warn!(
+                ahead_s = seconds(ahead_ns),
+                "checkpoint not used, starting as configured: it lies ahead of the first sample, whose clock has \
+                 started anew"
+            ),
+            Resumption::Unsound => warn!(
+                "checkpoint not used, starting as configured: its numbers grow beyond belief over the time since"
+            ),
         }
     }
 

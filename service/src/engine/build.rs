@@ -19,7 +19,10 @@ pub trait Use {
     type Output;
 
     /// Does it.
-    fn with<M: Model, H: History<M>>(self, engine: Engine<M, H>) -> Self::Output;
+    fn with<M: Model + 'static, H: History<M> + 'static>(
+        self,
+        engine: Engine<M, H>,
+    ) -> Self::Output;
 }
 
 /// Hands an engine of the configured model and filter to `user`.

@@ -1,10 +1,10 @@
 //! The engine: time, order, losses, the first state and restarts, whatever the model.
 
 use inekf_shared::message::{
-    Header, HeadingFix, INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY, PositionFix,
+    Header, HeadingFix, INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY, PositionFix, ProcessNoise,
     REASON_BUFFER_FULL, REASON_INTERNAL, REASON_NOT_READY, REASON_OUT_OF_RANGE, STATE_ALIGNING,
-    STATE_WAITING, SmoothedState, StateVector, VelocityFix, WAITING_FOR_IMU, WAITING_FOR_LEVEL,
-    WAITING_FOR_NOTHING, WAITING_FOR_POSITION, WAITING_FOR_REQUEST,
+    STATE_PAUSED, STATE_WAITING, SmoothedState, StateVector, VelocityFix, WAITING_FOR_IMU,
+    WAITING_FOR_LEVEL, WAITING_FOR_NOTHING, WAITING_FOR_POSITION, WAITING_FOR_REQUEST,
 };
 use inekf_shared::transport::InputMessage;
 use nalgebra::{Matrix3, Vector3};
@@ -13,6 +13,7 @@ use super::fix::{Antenna, Fix, Measurement};
 use super::history::{Breakdown, History, Insertion};
 use super::model::{Model, Preceding};
 use super::output::{Outbox, Output};
+use super::resume::{Earlier, ResumeSettings, Resumption};
 use super::settings::{FusionSettings, PositionSource};
 use super::stack::{Missing, Offered, Stack};
 use super::tally::{Refusal, Tally};
@@ -37,7 +38,12 @@ pub struct Engine<M: Model, H = Timeline<M>> {
     first_position: Option<(u64, Antenna)>,
     /// A state that was requested before the first sample, to hold from that sample on.
     requested: Option<M::State>,
-    /// Fixes that came after that request.
+    /// A state of an earlier life, to continue from if the first sample says that it can be.
+    earlier: Option<Earlier<M::State>>,
+    resumption: Resumption,
+    /// Whether samples and fixes are only counted.
+    paused: bool,
+    /// Fixes that came after that request, or while the earlier state waited.
     early: Vec<Fix<M::Measurement>>,
     /// The last accepted sample with its stamp.
     last_input: Option<(u64, M::Input)>,
@@ -62,6 +68,9 @@ impl<M: Model, H: History<M>> Engine<M, H> {
             time_base: TimeBase::new(model.restart_gap_ns()),
             first_position: None,
             requested: None,
+            earlier: None,
+            resumption: Resumption::None,
+            paused: false,
             early: Vec::with_capacity(MAX_EARLY),
             last_input: None,
             missing: 0,
@@ -78,11 +87,14 @@ impl<M: Model, H: History<M>> Engine<M, H> {
 
     /// `STATE_*` and `WAITING_FOR_*` now.
     pub fn state(&self) -> (u32, u32) {
+        if self.paused {
+            return (STATE_PAUSED, WAITING_FOR_NOTHING);
+        }
         if let Some((stamp_ns, _)) = self.history.newest() {
             return (self.output.running_state(stamp_ns), WAITING_FOR_NOTHING);
         }
         let initial = self.model.initial();
-        if self.requested.is_some() {
+        if self.requested.is_some() || self.earlier.is_some() {
             (STATE_WAITING, WAITING_FOR_IMU)
         } else if initial.wait_for_request {
             (STATE_WAITING, WAITING_FOR_REQUEST)
@@ -98,6 +110,39 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     /// The time of now: stamp of the last accepted sample, or of a state set after it.
     pub fn last_sample_ns(&self) -> Option<u64> {
         self.time_base.last_ns()
+    }
+
+    /// How many estimates have been published.
+    pub fn estimates(&self) -> u64 {
+        self.output.published()
+    }
+
+    /// How many messages have fixes that were taken and not judged.
+    pub fn waiting(&self) -> u64 {
+        self.history.waiting()
+    }
+
+    /// What became of the state of an earlier life.
+    pub fn resumption(&self) -> Resumption {
+        self.resumption
+    }
+
+    /// Takes no sample and no fix until [`Engine::unpause`]; they are counted as refused.
+    pub fn pause(&mut self) {
+        self.paused = true;
+    }
+
+    /// Takes samples and fixes again. The time since the last sample is to the estimate what a silence is.
+    pub fn unpause(&mut self) {
+        self.paused = false;
+    }
+
+    /// Uses this process noise from the next sample on.
+    ///
+    /// # Errors
+    /// A sentence that names the fault and the range; the noise is then as it was.
+    pub fn reload_noise(&mut self, noise: &ProcessNoise) -> Result<(), &'static str> {
+        self.model.reload_noise(noise)
     }
 
     /// The current state and covariance, if there is one.
@@ -118,6 +163,10 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         let header = sample.header();
         let lost = self.output.tally.receive(M::INPUT, header);
         self.missing = self.missing.saturating_add(lost);
+        if self.paused {
+            self.missing = self.missing.saturating_add(1);
+            return self.output.tally.refuse(Refusal(REASON_NOT_READY));
+        }
         let before = Preceding {
             sample: self.last_input,
             missing: self.missing,
@@ -235,9 +284,31 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     pub fn reset(&mut self) {
         self.time_base = TimeBase::new(self.model.restart_gap_ns());
         self.requested = None;
+        self.give_up_earlier();
         self.last_input = None;
         self.missing = 0;
         self.forget();
+    }
+
+    /// Continues from a state of an earlier life at the first sample, if that is not too late by `settings` and nothing
+    /// else sets the state before. To be called before the first input.
+    ///
+    /// # Errors
+    /// A sentence that names the fault; the estimate then starts as configured.
+    pub fn resume_from(
+        &mut self,
+        state: &StateVector,
+        settings: ResumeSettings,
+    ) -> Result<(), &'static str> {
+        let stamp_ns = state.stamp_ns;
+        let state = self.model.requested(state)?;
+        self.earlier = Some(Earlier {
+            stamp_ns,
+            state,
+            settings,
+        });
+        self.resumption = Resumption::Waiting;
+        Ok(())
     }
 
     /// Continues from `state`; a stamp of 0 means the stamp of the last sample, or where the first one
@@ -261,6 +332,7 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         }
         let requested = self.model.requested(state)?;
         let Some(stamp_ns) = given_ns.or(last_ns) else {
+            self.give_up_earlier();
             self.requested = Some(requested);
             return Ok(());
         };
@@ -278,6 +350,7 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         outbox: &mut impl Outbox<M::Estimate>,
     ) {
         let fix = match fix {
+            Ok(_) if self.paused => return self.output.tally.refuse(Refusal(REASON_NOT_READY)),
             Ok(fix) => fix,
             Err(refusal) => return self.output.tally.refuse(refusal),
         };
@@ -349,7 +422,8 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     /// Before there is a state, a position fix is kept to start from, and all are kept for a requested state;
     /// otherwise they have nothing to correct. A fix that is replaced or unusable is counted as not ready.
     fn keep_first(&mut self, fix: Fix<M::Measurement>) {
-        if self.requested.is_some() && self.early.len() < MAX_EARLY {
+        let awaited = self.requested.is_some() || self.earlier.is_some();
+        if awaited && self.early.len() < MAX_EARLY {
             return self.early.push(fix);
         }
         let initial = self.model.initial();
@@ -374,6 +448,9 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         let of_stamp = |start_ns| (start_ns == stamp_ns).then_some(*input);
         if let Some(state) = self.requested.take() {
             self.start(without_ns, of_stamp(without_ns), state);
+            return true;
+        }
+        if self.try_resume(without_ns, stamp_ns, input) {
             return true;
         }
         if self.model.initial().wait_for_request {
@@ -411,6 +488,42 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         true
     }
 
+    /// Continues from the state of an earlier life, if there is one that can be. Of odometry the first row, which
+    /// begins at `begins_ns`, speaks for a part of the time since.
+    fn try_resume(&mut self, begins_ns: u64, stamp_ns: u64, input: &M::Input) -> bool {
+        let Some(earlier) = self.earlier.take() else {
+            return false;
+        };
+        self.resumption = earlier.judge(stamp_ns);
+        if let Resumption::Resumed { .. } = self.resumption {
+            let start_ns = begins_ns.max(earlier.stamp_ns).min(stamp_ns);
+            let silence_ns = start_ns - earlier.stamp_ns;
+            let mut state = earlier.state;
+            self.model
+                .endure(&mut state, silence_ns, &earlier.settings.doubt);
+            if self.model.is_sound(&state) {
+                self.start(start_ns, (start_ns == stamp_ns).then_some(*input), state);
+                self.output.resumed();
+                return true;
+            }
+            self.resumption = Resumption::Unsound;
+        }
+        // What came for it is now as if there had been none.
+        let mut early = core::mem::take(&mut self.early);
+        for fix in early.drain(..) {
+            self.keep_first(fix);
+        }
+        self.early = early;
+        false
+    }
+
+    /// Something else sets the state.
+    fn give_up_earlier(&mut self) {
+        if self.earlier.take().is_some() {
+            self.resumption = Resumption::None;
+        }
+    }
+
     /// How old the fix may be that the state starts from: as late as any fix may be, or as long as
     /// the samples need not be doubted.
     fn oldest_start_ns(&self) -> u64 {
@@ -422,6 +535,7 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         self.forget();
         self.early = early;
         self.requested = None;
+        self.give_up_earlier();
         self.output.started(stamp_ns, &self.model.place_w(&state));
         self.history.start(stamp_ns, input, state);
         self.time_base.advance_to(stamp_ns);

@@ -8,6 +8,7 @@
 //!   [`odometry`]: the models `odometry2d` and `odometry3d`; [`mod@build`]: from a configuration to one of them
 //! - [`intake`]: checks; [`tally`]: counters; [`time_base`]: jumps of the clock
 //! - [`levelling`], [`set_state`]: the first state
+//! - [`resume`]: the state of an earlier life
 //! - [`history`]: samples, fixes at their own stamps, late ones; [`timeline`]: those of a filter; [`smoothing`]: those of
 //!   a smoother; [`stack`]: fixes taken together;
 //!   [`recovery`]: out of a lock-out
@@ -24,6 +25,7 @@ pub mod model;
 pub mod odometry;
 pub mod output;
 pub mod recovery;
+pub mod resume;
 pub mod set_state;
 pub mod settings;
 pub mod smoothing;

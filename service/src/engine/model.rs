@@ -9,13 +9,15 @@ use core::fmt::Debug;
 use inekf::filter::{Alignment, UpdateError, Verdict};
 use inekf::lie::SO3;
 use inekf_shared::message::{
-    EstimateMessage, HeadingFix, PositionFix, REASON_WRONG_MODEL, StateVector, VelocityFix,
+    EstimateMessage, HeadingFix, PositionFix, ProcessNoise, REASON_WRONG_MODEL, StateVector,
+    VelocityFix,
 };
 use inekf_shared::transport::InputMessage;
 use nalgebra::Vector3;
 
 use super::fix::{Fix, Measurement};
 use super::recovery::Widening;
+use super::resume::Doubt;
 use super::settings::InitialSettings;
 use super::tally::Refusal;
 
@@ -126,6 +128,15 @@ pub trait Model: Debug + Sized {
 
     /// Moves the state along the next `part_ns` nanoseconds of a motion.
     fn advance(&self, state: &mut Self::State, motion: &Self::Motion, part_ns: u64);
+
+    /// Moves the state over `silence_ns` nanoseconds of which nothing is known but `doubt`.
+    fn endure(&self, state: &mut Self::State, silence_ns: u64, doubt: &Doubt);
+
+    /// Uses this process noise from now on.
+    ///
+    /// # Errors
+    /// A sentence that names the fault and the range; the noise is then as it was.
+    fn reload_noise(&mut self, noise: &ProcessNoise) -> Result<(), &'static str>;
 
     /// Whether the state has not broken down.
     fn is_sound(&self, state: &Self::State) -> bool;

@@ -2,8 +2,9 @@
 
 use inekf::filter::{Covariance, Verdict};
 use inekf_shared::message::{
-    ESTIMATE_DEGRADED, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED, ESTIMATE_RESET, ESTIMATE_UPDATED,
-    EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL, STATE_DEGRADED, STATE_RUNNING,
+    ESTIMATE_DEGRADED, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED, ESTIMATE_RESET, ESTIMATE_RESUMED,
+    ESTIMATE_UPDATED, EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL, STATE_DEGRADED,
+    STATE_RUNNING,
 };
 use nalgebra::Vector3;
 
@@ -39,6 +40,8 @@ pub struct Output<E> {
     has_started: bool,
     /// Set at a restart, until the next estimate has said so.
     announce_reset: bool,
+    /// Likewise, where the state is that of an earlier life.
+    announce_resumed: bool,
 }
 
 impl<E: EstimateMessage> Output<E> {
@@ -54,6 +57,7 @@ impl<E: EstimateMessage> Output<E> {
             last_aided_ns: 0,
             has_started: false,
             announce_reset: false,
+            announce_resumed: false,
         }
     }
 
@@ -65,6 +69,7 @@ impl<E: EstimateMessage> Output<E> {
 
     /// Notes that the state was set to `place_w` at `stamp_ns`.
     pub fn started(&mut self, stamp_ns: u64, place_w: &Vector3<f64>) {
+        self.announce_resumed = false;
         if self.has_started {
             let head = self.message.head_mut();
             head.reset_count += 1;
@@ -74,6 +79,16 @@ impl<E: EstimateMessage> Output<E> {
         self.has_started = true;
         self.last_aided_ns = stamp_ns;
         self.place_w = *place_w;
+    }
+
+    /// Notes that the state that was set is that of an earlier life.
+    pub fn resumed(&mut self) {
+        self.announce_resumed = true;
+    }
+
+    /// How many estimates have been published.
+    pub fn published(&self) -> u64 {
+        self.message.head().estimate_seq
     }
 
     /// `STATE_RUNNING` or `STATE_DEGRADED` at `stamp_ns`.
@@ -152,6 +167,9 @@ impl<E: EstimateMessage> Output<E> {
         }
         if core::mem::take(&mut self.announce_reset) {
             flags |= ESTIMATE_RESET;
+        }
+        if core::mem::take(&mut self.announce_resumed) {
+            flags |= ESTIMATE_RESUMED;
         }
         self.place_w = model.place_w(of);
         model.write(of, &mut self.message);

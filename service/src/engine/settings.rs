@@ -8,6 +8,7 @@ use inekf_shared::message::MAX_SOURCES;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fix::{Antenna, FixKind};
+use super::resume::Doubt;
 use super::stack::{Missing, StackSettings};
 use crate::config::{
     self, Config, GapPolicy, Hold, Inertial, Level, MissingPartner, Motion, Parametrisation,
@@ -82,18 +83,28 @@ impl InitialSettings {
 impl ImuSettings {
     /// The noise over an interval of `interval_ns`.
     pub fn noise(&self, interval_ns: u64) -> ImuNoise {
+        if interval_ns > self.max_gap_ns {
+            self.noise_with(interval_ns, self.gap_gyro_sigma, self.gap_accel_sigma)
+        } else {
+            self.noise_with(interval_ns, 0.0, 0.0)
+        }
+    }
+
+    /// The noise over `silence_ns` in which nothing was heard.
+    pub fn noise_of_silence(&self, silence_ns: u64, doubt: &Doubt) -> ImuNoise {
+        self.noise_with(silence_ns, doubt.turn_sigma, doubt.accel_sigma)
+    }
+
+    /// The noise over an interval whose mean angular rate (rad/s) and specific force (m/s^2) are doubted as well.
+    fn noise_with(&self, interval_ns: u64, gyro_sigma: f64, accel_sigma: f64) -> ImuNoise {
         let dt_s = seconds(interval_ns);
-        let (mut gyro_psd, mut accel_psd) = match self.white {
+        let (gyro_psd, accel_psd) = match self.white {
             WhiteNoise::Density { gyro, accel } => (gyro * gyro, accel * accel),
             WhiteNoise::PerSample { gyro, accel } => (gyro * gyro * dt_s, accel * accel * dt_s),
         };
-        if interval_ns > self.max_gap_ns {
-            gyro_psd += self.gap_gyro_sigma * self.gap_gyro_sigma * dt_s;
-            accel_psd += self.gap_accel_sigma * self.gap_accel_sigma * dt_s;
-        }
         ImuNoise {
-            gyro_psd,
-            accel_psd,
+            gyro_psd: gyro_psd + gyro_sigma * gyro_sigma * dt_s,
+            accel_psd: accel_psd + accel_sigma * accel_sigma * dt_s,
             gyro_bias_psd: self.gyro_bias_walk * self.gyro_bias_walk,
             accel_bias_psd: self.accel_bias_walk * self.accel_bias_walk,
         }

@@ -21,7 +21,10 @@ struct Allocations<'a>(&'a [Input]);
 impl Use for Allocations<'_> {
     type Output = (u64, u64);
 
-    fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) -> (u64, u64) {
+    fn with<M: Model + 'static, H: History<M> + 'static>(
+        self,
+        mut engine: Engine<M, H>,
+    ) -> (u64, u64) {
         let mut sink = Sink(0);
         let allocated = allocations(|| {
             for input in self.0 {

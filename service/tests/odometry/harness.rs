@@ -2,7 +2,8 @@
 
 use std::any::Any;
 
-use inekf_service::config::Config;
+use inekf_service::config::{Checkpoint, Config};
+use inekf_service::engine::resume::ResumeSettings;
 use inekf_service::engine::{Engine, History, Model, Outbox, Use, build};
 use inekf_shared::message::{
     Counters, EstimateHead, EstimateMessage, EstimateSe2, EstimateSe3, Header, INPUTS,
@@ -26,6 +27,8 @@ pub enum Input {
     Space(Odometry3d),
     Fix(PositionFix),
     Set(StateVector),
+    /// A state of an earlier life.
+    Resume(StateVector),
     Reset,
 }
 
@@ -134,6 +137,9 @@ pub fn feed<M: Model, H: History<M>>(
             engine.sample(row, 0, outbox);
         }
         Input::Fix(fix) => engine.position(fix, outbox),
+        Input::Resume(state) => {
+            return engine.resume_from(state, ResumeSettings::new(&Checkpoint::default()));
+        }
         Input::Set(state) => return engine.set_state(state),
         Input::Reset => engine.reset(),
     }
@@ -145,7 +151,10 @@ struct Feed<'a>(&'a [Input]);
 impl Use for Feed<'_> {
     type Output = Outcome;
 
-    fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) -> Outcome {
+    fn with<M: Model + 'static, H: History<M> + 'static>(
+        self,
+        mut engine: Engine<M, H>,
+    ) -> Outcome {
         let mut outbox = All::default();
         let mut refusals = Vec::new();
         for input in self.0 {

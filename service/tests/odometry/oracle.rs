@@ -106,7 +106,10 @@ impl<E: EstimateMessage> Outbox<E> for LastOfStamp {
 impl Use for Feed<'_> {
     type Output = Vec<EstimateSe2>;
 
-    fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) -> Vec<EstimateSe2> {
+    fn with<M: Model + 'static, H: History<M> + 'static>(
+        self,
+        mut engine: Engine<M, H>,
+    ) -> Vec<EstimateSe2> {
         let mut outbox = LastOfStamp(Vec::new());
         if let Some(state) = &self.0.state {
             engine.set_state(state).unwrap();

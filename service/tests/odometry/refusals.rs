@@ -20,7 +20,7 @@ struct Nothing;
 impl Use for Nothing {
     type Output = ();
 
-    fn with<M: Model, H: History<M>>(self, _engine: Engine<M, H>) {}
+    fn with<M: Model + 'static, H: History<M> + 'static>(self, _engine: Engine<M, H>) {}
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! States by request: what is refused, the configured covariance, and the way of a snapshot there and back.
 
-use inekf_shared::message::{MODEL_IMU, MODEL_ODOMETRY_3D, StateVector, triangle_index};
+use inekf_shared::message::{
+    ESTIMATE_RESUMED, MODEL_IMU, MODEL_ODOMETRY_3D, StateVector, triangle_index,
+};
 
 use super::harness::{
     CHOICES, Input, PERIOD, START, named, planar_state, plane, run, space, spatial_state,
@@ -98,4 +100,76 @@ fn a_snapshot_sets_the_same_state() {
             );
         }
     }
+}
+
+/// With odometry nobody knows the speed: the pose stays where it was, doubted by how fast it may have turned and moved.
+#[test]
+fn a_pose_of_an_earlier_life_stays_and_is_doubted_by_the_time_since() {
+    // 3 s before the first row, which speaks for 0.1 s of them.
+    let t = 2.9_f64;
+    let first_ns = START + 30 * PERIOD;
+    for choice in CHOICES {
+        let earlier = planar_state(START, PLANE);
+        let inputs = [Input::Resume(earlier), plane(first_ns, 1, [0.0, 0.0, 0.0])];
+        let outcome = run(&choice.text(2, ""), &inputs);
+        let found = &outcome.estimates[0];
+        assert_eq!(found.head.flags & ESTIMATE_RESUMED, ESTIMATE_RESUMED);
+        assert_eq!(found.head.stamp_ns, first_ns);
+        for (found, expected) in found.mean.iter().zip([0.3, 4.0, -3.0]) {
+            assert!((found - expected).abs() < 1e-9, "{}: {found}", choice.name);
+        }
+        // What the row adds is noise of 0.1 s, as for the silence: 0.01 rad and 0.02 m by the root of a second.
+        let turned = PLANE[0] + (0.2 * t).powi(2) + 0.01_f64.powi(2) * 3.0;
+        let found = outcome.snapshot.unwrap().covariance[0];
+        assert!(
+            (found / turned - 1.0).abs() < 0.01,
+            "{}: {found}",
+            choice.name
+        );
+    }
+
+    let earlier = planar_state(START, [0.0, 1.0, 2.0]);
+    let outcome = run(
+        &named("left").text(2, ""),
+        &[Input::Resume(earlier), plane(first_ns, 1, [0.0, 0.0, 0.0])],
+    );
+    let found = outcome.snapshot.unwrap();
+    for (axis, before) in [(1, 1.0), (2, 2.0)] {
+        let found = found.covariance[triangle_index(axis, axis, 3).unwrap()];
+        let expected = before + (2.0 * t).powi(2) + 0.02_f64.powi(2) * 3.0;
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
+}
+
+#[test]
+fn a_row_that_reaches_back_to_the_earlier_state_speaks_for_all_the_time_since() {
+    // 0.05 s, while the first row speaks for 0.1 s: no silence at all.
+    let earlier = planar_state(START, PLANE);
+    let first = plane(START + PERIOD / 2, 1, [0.1, 0.4, 0.0]);
+    let outcome = run(&named("left").text(2, ""), &[Input::Resume(earlier), first]);
+    let [theta, x, y] = outcome.estimates[0].mean[..] else {
+        panic!("three numbers")
+    };
+    // Half of the row.
+    assert!((theta - 0.35).abs() < 1e-12, "{theta}");
+    assert!(((x - 4.0).hypot(y + 3.0) - 0.2).abs() < 1e-3);
+    let found = outcome.snapshot.unwrap().covariance[0];
+    assert!(
+        (found - PLANE[0] - 0.01_f64.powi(2) * 0.05).abs() < 1e-12,
+        "{found}"
+    );
+
+    let late = planar_state(START, PLANE);
+    let first = space(START + 200 * PERIOD, 1, [0.0; 6]);
+    let outcome = run(
+        &named("left").text(3, ""),
+        &[Input::Resume(spatial_state(START, SPACE)), first],
+    );
+    assert_eq!(
+        outcome.estimates[0].head.flags & ESTIMATE_RESUMED,
+        0,
+        "too old"
+    );
+    let outcome = run(&named("left").text(3, ""), &[Input::Resume(late)]);
+    assert!(outcome.refusals[0].contains("another model"));
 }

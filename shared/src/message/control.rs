@@ -4,7 +4,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 use super::layout::layout;
-use super::{Counters, INPUTS, NAV_TRI, REASONS, serde_array};
+use super::{Counters, INPUTS, NAV_TRI, ProcessNoise, REASONS, serde_array};
 
 /// Request: forget the state and initialise anew.
 pub const CONTROL_RESET: u32 = 1;
@@ -17,6 +17,18 @@ pub const CONTROL_BARRIER: u32 = 4;
 /// Request: publish the states in the window of the smoother.
 pub const CONTROL_SMOOTHED: u32 = 5;
 
+/// Request: take no sample and no fix until [`CONTROL_RESUME`]; they are counted as refused (not ready).
+pub const CONTROL_PAUSE: u32 = 6;
+/// Request: end a pause. What follows is to the estimate as if the samples had been silent for as long.
+pub const CONTROL_RESUME: u32 = 7;
+/// Request: use [`ControlRequest::noise`] from the next sample on.
+pub const CONTROL_RELOAD_NOISE: u32 = 8;
+/// Request: answer with the text of the configuration from byte [`ControlRequest::argument`] on.
+pub const CONTROL_CONFIG: u32 = 9;
+/// Request: take a journal's entry, whose kind is [`ControlRequest::argument`]. Only of a daemon that was started to
+/// be fed by requests (`--stepped`), so that a journal can be replayed in its own order.
+pub const CONTROL_TAKE: u32 = 10;
+
 /// Name of a kind of request; `"unknown"` for a code that is not defined.
 #[must_use]
 pub const fn control_kind_name(code: u32) -> &'static str {
@@ -26,6 +38,11 @@ pub const fn control_kind_name(code: u32) -> &'static str {
         CONTROL_SNAPSHOT => "snapshot",
         CONTROL_BARRIER => "barrier",
         CONTROL_SMOOTHED => "smoothed",
+        CONTROL_PAUSE => "pause",
+        CONTROL_RESUME => "resume",
+        CONTROL_RELOAD_NOISE => "reload-noise",
+        CONTROL_CONFIG => "config",
+        CONTROL_TAKE => "take",
         _ => "unknown",
     }
 }
@@ -44,6 +61,9 @@ pub const fn control_status_name(code: u32) -> &'static str {
         _ => "unknown",
     }
 }
+
+/// Bytes of the longest input message.
+pub const MAX_INPUT_LEN: usize = 136;
 
 /// Bytes of the text of a refusal.
 pub const REASON_TEXT_LEN: usize = 256;
@@ -87,28 +107,34 @@ layout! {
 /// What a client asks of the daemon.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.ControlRequest.v1")]
+#[type_name("inekf.ControlRequest.v2")]
 pub struct ControlRequest {
     /// `CONTROL_*` kind.
     pub kind: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// With [`CONTROL_CONFIG`] an offset in bytes, with [`CONTROL_TAKE`] a `JOURNAL_*` kind, else zero.
+    pub argument: u32,
     /// Chosen by the client; the response repeats it.
     pub request_id: u64,
-    /// The state to continue from with [`CONTROL_SET_STATE`], else zero.
+    /// The state to continue from with [`CONTROL_SET_STATE`], or with [`CONTROL_TAKE`] of the kind `JOURNAL_RESUME`;
+    /// else zero.
     pub state: StateVector,
+    /// Process noise with [`CONTROL_RELOAD_NOISE`], else zero.
+    pub noise: ProcessNoise,
+    /// The bytes of an input message with [`CONTROL_TAKE`], then zeros; else zero.
+    #[serde(with = "serde_array")]
+    pub input: [u8; MAX_INPUT_LEN],
 }
 
 layout! {
-    ControlRequest as "inekf.ControlRequest.v1", size 1120, align 8 {
-        kind: 0, reserved: 4, request_id: 8, state: 16,
+    ControlRequest as "inekf.ControlRequest.v2", size 1328, align 8 {
+        kind: 0, argument: 4, request_id: 8, state: 16, noise: 1120, input: 1192,
     }
 }
 
 /// What the daemon answers.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.ControlResponse.v3")]
+#[type_name("inekf.ControlResponse.v4")]
 pub struct ControlResponse {
     /// The id of the request.
     pub request_id: u64,
@@ -120,7 +146,8 @@ pub struct ControlResponse {
     pub waiting_for: u32,
     /// Bytes of `reason` in use.
     pub reason_len: u32,
-    /// Why the request was refused, UTF-8; read it with [`ControlResponse::reason`].
+    /// Why the request was refused, UTF-8; read it with [`ControlResponse::reason`]. With [`CONTROL_CONFIG`], as many
+    /// bytes of the text as fit.
     #[serde(with = "serde_array")]
     pub reason: [u8; REASON_TEXT_LEN],
     /// What became of the inputs.
@@ -131,14 +158,17 @@ pub struct ControlResponse {
     pub rejected_by_reason: [u64; REASONS],
     /// With [`CONTROL_SMOOTHED`] how many states have been published on the topic `smoothed`, else zero.
     pub smoothed: u64,
+    /// With [`CONTROL_CONFIG`] how many bytes the whole text has, else zero.
+    pub config_len: u64,
     /// The current state with [`CONTROL_SNAPSHOT`], else zero.
     pub state: StateVector,
 }
 
 layout! {
-    ControlResponse as "inekf.ControlResponse.v3", size 1616, align 8 {
+    ControlResponse as "inekf.ControlResponse.v4", size 1624, align 8 {
         request_id: 0, status: 8, state_code: 12, waiting_for: 16, reason_len: 20, reason: 24,
-        counters: 280, received: 328, rejected_by_reason: 376, smoothed: 504, state: 512,
+        counters: 280, received: 328, rejected_by_reason: 376, smoothed: 504, config_len: 512,
+        state: 520,
     }
 }
 
@@ -152,6 +182,22 @@ impl ControlResponse {
         self.reason = [0; REASON_TEXT_LEN];
         self.reason[..end].copy_from_slice(&text.as_bytes()[..end]);
         self.reason_len = end as u32;
+    }
+
+    /// Writes a page of the configuration's text: what there is of it from `offset` on and fits.
+    pub fn set_page(&mut self, text: &str, offset: usize) {
+        let rest = text.as_bytes().get(offset..).unwrap_or_default();
+        let len = rest.len().min(REASON_TEXT_LEN);
+        self.reason = [0; REASON_TEXT_LEN];
+        self.reason[..len].copy_from_slice(&rest[..len]);
+        self.reason_len = len as u32;
+        self.config_len = text.len() as u64;
+    }
+
+    /// The page of the configuration's text that a response to [`CONTROL_CONFIG`] holds.
+    #[must_use]
+    pub fn page(&self) -> &[u8] {
+        &self.reason[..(self.reason_len as usize).min(REASON_TEXT_LEN)]
     }
 
     /// The text of a refusal. Whatever a faulty writer left, this is text: the length is cut to the field, and what

@@ -135,10 +135,17 @@ pub const fn input_name(index: usize) -> &'static str {
     }
 }
 
+/// Flag: the estimate began with the state of a checkpoint.
+pub const HEALTH_RESUMED: u32 = 1;
+/// Flag: there was a checkpoint, and it could not be used; the log says why.
+pub const HEALTH_NOT_RESUMED: u32 = 2;
+/// Every flag that is defined.
+pub const HEALTH_FLAGS: u32 = HEALTH_RESUMED | HEALTH_NOT_RESUMED;
+
 /// How the daemon is, about once a second.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.Health.v2")]
+#[type_name("inekf.Health.v3")]
 pub struct Health {
     /// When it was written, CLOCK_MONOTONIC, nanoseconds.
     pub stamp_ns: u64,
@@ -152,7 +159,7 @@ pub struct Health {
     pub waiting_for: u32,
     /// `MODEL_*` code.
     pub model: u32,
-    /// No flag is defined: zero.
+    /// `HEALTH_*` flags.
     pub flags: u32,
     /// Stamp of the last accepted IMU or odometry sample, nanoseconds of the sensor clock; 0 before the first.
     pub last_imu_stamp_ns: u64,
@@ -164,12 +171,18 @@ pub struct Health {
     pub rejected_by_reason: [u64; REASONS],
     /// Messages received, indexed by `INPUT_*`.
     pub received: [u64; INPUTS],
+    /// Checkpoints written since the daemon's start.
+    pub checkpoints: u64,
+    /// Checkpoints that could not be written.
+    pub checkpoint_failures: u64,
+    /// Entries that are missing from the journal because they could not be published.
+    pub journal_failures: u64,
 }
 
 layout! {
-    Health as "inekf.Health.v2", size 280, align 8 {
+    Health as "inekf.Health.v3", size 304, align 8 {
         stamp_ns: 0, uptime_ns: 8, instance_pid: 16, state: 24, waiting_for: 28, model: 32,
         flags: 36, last_imu_stamp_ns: 40, imu_rate_hz: 48, counters: 56, rejected_by_reason: 104,
-        received: 232,
+        received: 232, checkpoints: 280, checkpoint_failures: 288, journal_failures: 296,
     }
 }

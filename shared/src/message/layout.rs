@@ -41,6 +41,12 @@ pub trait Message:
 
     /// Name and byte offset of every field, in order: for layout tests in other languages.
     const FIELDS: &'static [(&'static str, usize)];
+
+    /// The bytes of the message, as they lie in shared memory.
+    fn as_bytes(&self) -> &[u8];
+
+    /// The message that has these bytes; `None` if they are too many or too few.
+    fn from_bytes(bytes: &[u8]) -> Option<Self>;
 }
 
 /// Size of the field that `_project` borrows.
@@ -67,6 +73,20 @@ macro_rules! layout {
         impl $crate::message::Message for $name {
             const TYPE_NAME: &'static str = $type_name;
             const FIELDS: &'static [(&'static str, usize)] = &[$((stringify!($field), $offset)),+];
+
+            fn as_bytes(&self) -> &[u8] {
+                // SAFETY: below it is asserted that the fields, which are numbers or made of such (`Zero`), fill the
+                // struct without a hole, so that every byte is initialised.
+                unsafe { core::slice::from_raw_parts((&raw const *self).cast(), size_of::<Self>()) }
+            }
+
+            fn from_bytes(bytes: &[u8]) -> Option<Self> {
+                if bytes.len() != size_of::<Self>() {
+                    return None;
+                }
+                // SAFETY: the bytes are as many as the struct has, and any bytes are a value of numbers (`Zero`).
+                Some(unsafe { bytes.as_ptr().cast::<Self>().read_unaligned() })
+            }
         }
 
         const _: () = {

@@ -2,7 +2,7 @@
 //! limits without repeating them. What comes back are iceoryx2's own ports, with no layer on the hot path.
 //!
 //! A process makes one [`Node`] ([`open_node`]), opens services on it ([`inputs`], [`estimate`], [`latest`],
-//! [`health`], [`smoothed`], [`control`], [`wake`]) and makes ports from those. Ports and services keep the node alive. None of
+//! [`health`], [`smoothed`], [`journal`], [`control`], [`wake`]) and makes ports from those. Ports and services keep the node alive. None of
 //! them can move to another thread: a thread that needs ports makes its own node.
 //!
 //! Where iceoryx2 keeps its files, from the environment:
@@ -113,8 +113,8 @@ pub use node::{
     config_from_env, open_node, open_node_with,
 };
 pub use open::{
-    InputMessage, Inputs, control, estimate, estimate_model, health, input, inputs, latest,
-    open_latest, smoothed, wake,
+    InputMessage, Inputs, control, estimate, estimate_model, health, input, inputs, journal,
+    latest, open_latest, smoothed, wake,
 };
 pub use outlet::Outlet;
 pub use reserve::reserve_shared_memory;

@@ -13,8 +13,8 @@ use super::service::{Control, Latest, PubSub, Wake};
 use super::{Node, TransportError};
 use crate::message::{
     ControlRequest, ControlResponse, EstimateMessage, EstimateSe2, EstimateSe3, EstimateSe23,
-    Header, HeadingFix, Health, ImuSample, Message, Odometry2d, Odometry3d, PositionFix,
-    SmoothedState, VelocityFix,
+    Header, HeadingFix, Health, ImuSample, JournalEntry, Message, Odometry2d, Odometry3d,
+    PositionFix, SmoothedState, VelocityFix,
 };
 use crate::qos::{self, PubSubQos};
 use crate::topic::{Instance, Topic};
@@ -117,6 +117,14 @@ pub fn smoothed(node: &Node, instance: &Instance) -> Result<PubSub<SmoothedState
 /// As [`input`].
 pub fn health(node: &Node, instance: &Instance) -> Result<PubSub<Health>, TransportError> {
     pub_sub(node, instance, Topic::Health)
+}
+
+/// Opens the journal of an instance.
+///
+/// # Errors
+/// As [`input`].
+pub fn journal(node: &Node, instance: &Instance) -> Result<PubSub<JournalEntry>, TransportError> {
+    pub_sub(node, instance, Topic::Journal)
 }
 
 /// The `MODEL_*` code whose estimates the instance carries; `None` if nobody has opened them yet, or if their type is

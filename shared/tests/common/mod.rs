@@ -31,22 +31,19 @@ macro_rules! for_every_message {
         $check::<ControlRequest>();
         $check::<ControlResponse>();
         $check::<SmoothedState>();
+        $check::<ProcessNoise>();
+        $check::<JournalEntry>();
     }};
 }
 
 /// A message made of these bytes, which must be as many as it has.
 pub fn from_bytes<M: Message>(bytes: &[u8]) -> M {
-    assert_eq!(bytes.len(), size_of::<M>());
-    // SAFETY: a message is `#[repr(C)]`, made of integers and floats only and without padding, so any bytes are one;
-    // `read_unaligned` asks nothing of the source's alignment.
-    unsafe { bytes.as_ptr().cast::<M>().read_unaligned() }
+    M::from_bytes(bytes).unwrap()
 }
 
 /// The bytes of a message.
 pub fn to_bytes<M: Message>(message: &M) -> &[u8] {
-    // SAFETY: a message has no padding (asserted beside each), so every byte is initialised; the slice lives as long
-    // as the borrow.
-    unsafe { core::slice::from_raw_parts(core::ptr::from_ref(message).cast(), size_of::<M>()) }
+    message.as_bytes()
 }
 
 /// Shared memory that no other test sees: own directory, own prefix.

@@ -3,8 +3,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use inekf_service::config::{Config, WaitMode};
-use inekf_service::daemon::{self, Ports};
+use inekf_service::config::Config;
+use inekf_service::daemon::run::run;
+use inekf_service::daemon::{Ports, Terms, Vehicle};
 use inekf_service::engine::{self, Engine, History, Model, Use};
 use inekf_shared::message::{EstimateSe23, Zero};
 use inekf_shared::transport;
@@ -27,17 +28,19 @@ struct Serve<'a> {
 impl Use for Serve<'_> {
     type Output = ();
 
-    fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) {
-        let ports = Ports::open_on(
-            self.memory.node(),
-            &instance(INSTANCE),
-            WaitMode::Spin,
-            false,
-        );
-        let mut ports = ports.expect("ports");
+    fn with<M: Model + 'static, H: History<M> + 'static>(self, engine: Engine<M, H>) {
+        let node = self.memory.node();
+        let ports = Ports::open_on(node, &instance(INSTANCE), self.config, false);
+        let terms = Terms {
+            config: self.config,
+            config_text: CONFIG,
+            stepped: false,
+            unused_checkpoint: false,
+        };
+        let vehicle = Vehicle::new(engine, ports.expect("ports"), terms, None);
         watch_this_thread();
         self.is_ready.store(true, Ordering::Release);
-        daemon::run(&mut engine, &mut ports, self.config, self.stop).expect("it runs");
+        run(&mut [Box::new(vehicle)], &self.config.runtime, self.stop).expect("it runs");
     }
 }
 

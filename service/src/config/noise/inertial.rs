@@ -51,6 +51,11 @@ impl WhiteNoise {
     }
 }
 
+/// What each number of the gyroscope may be, in its own unit.
+pub(super) const GYRO_RANGE: Interval = Interval::closed(0.0, 10.0);
+/// What each number of the accelerometer may be, in its own unit.
+pub(super) const ACCEL_RANGE: Interval = Interval::closed(0.0, 100.0);
+
 const DENSITY: [&str; 2] = ["gyro_density", "accel_density"];
 const PER_SAMPLE: [&str; 2] = ["gyro_sigma_per_sample", "accel_sigma_per_sample"];
 
@@ -68,18 +73,8 @@ impl InertialNoise {
     pub(super) fn read(noise: &mut Section<'_, '_>, relevance: Relevance) -> Self {
         Self {
             white: WhiteNoise::read(noise, relevance),
-            gyro_bias_walk: noise.float(
-                "gyro_bias_walk",
-                "rad/s^2/sqrt(Hz)",
-                Interval::closed(0.0, 10.0),
-                0.0,
-            ),
-            accel_bias_walk: noise.float(
-                "accel_bias_walk",
-                "m/s^3/sqrt(Hz)",
-                Interval::closed(0.0, 100.0),
-                0.0,
-            ),
+            gyro_bias_walk: noise.float("gyro_bias_walk", "rad/s^2/sqrt(Hz)", GYRO_RANGE, 0.0),
+            accel_bias_walk: noise.float("accel_bias_walk", "m/s^3/sqrt(Hz)", ACCEL_RANGE, 0.0),
         }
     }
 }
@@ -87,15 +82,13 @@ impl InertialNoise {
 impl WhiteNoise {
     /// Exactly one of the two pairs must be given, and whole.
     fn read(noise: &mut Section<'_, '_>, relevance: Relevance) -> Self {
-        let gyro_range = Interval::closed(0.0, 10.0);
-        let accel_range = Interval::closed(0.0, 100.0);
         let densities = [
-            noise.optional_float(DENSITY[0], Some("rad/s/sqrt(Hz)"), gyro_range),
-            noise.optional_float(DENSITY[1], Some("m/s^2/sqrt(Hz)"), accel_range),
+            noise.optional_float(DENSITY[0], Some("rad/s/sqrt(Hz)"), GYRO_RANGE),
+            noise.optional_float(DENSITY[1], Some("m/s^2/sqrt(Hz)"), ACCEL_RANGE),
         ];
         let sigmas = [
-            noise.optional_float(PER_SAMPLE[0], Some("rad/s"), gyro_range),
-            noise.optional_float(PER_SAMPLE[1], Some("m/s^2"), accel_range),
+            noise.optional_float(PER_SAMPLE[0], Some("rad/s"), GYRO_RANGE),
+            noise.optional_float(PER_SAMPLE[1], Some("m/s^2"), ACCEL_RANGE),
         ];
         // Zeros stand where a fault has been noted: nobody gets to see them.
         let or_zero = |values: [Option<f64>; 2]| values.map(Option::unwrap_or_default);

@@ -135,6 +135,11 @@ impl IncrementNoise {
     }
 }
 
+/// What each number of the rotation may be, in its own unit.
+pub(super) const ROTATION_RANGE: Interval = Interval::closed(0.0, 10.0);
+/// What each number of the translation may be, in its own unit.
+pub(super) const TRANSLATION_RANGE: Interval = Interval::closed(0.0, 100.0);
+
 const DENSITY: [&str; 2] = ["rotation_density", "translation_density"];
 const PER_ROW: [&str; 2] = ["rotation_sigma_per_row", "translation_sigma_per_row"];
 const LATERAL_DENSITY: &str = "lateral_density";
@@ -155,8 +160,8 @@ pub(super) const KEYS: [&str; 9] = [
 
 impl OdometryNoise {
     pub(super) fn read(noise: &mut Section<'_, '_>, relevance: Relevance) -> Self {
-        let rotation = Interval::closed(0.0, 10.0);
-        let translation = Interval::closed(0.0, 100.0);
+        let rotation = ROTATION_RANGE;
+        let translation = TRANSLATION_RANGE;
         Self {
             white: IncrementNoise::read(noise, relevance),
             rotation_per_sqrt_m: noise.float("rotation_per_sqrt_m", "rad/sqrt(m)", rotation, 0.0),
@@ -179,8 +184,8 @@ impl OdometryNoise {
 impl IncrementNoise {
     /// Exactly one of the two pairs must be given, and whole; lateral goes with either.
     fn read(noise: &mut Section<'_, '_>, relevance: Relevance) -> Self {
-        let rotation = Interval::closed(0.0, 10.0);
-        let translation = Interval::closed(0.0, 100.0);
+        let rotation = ROTATION_RANGE;
+        let translation = TRANSLATION_RANGE;
         let densities = [
             noise.optional_float(DENSITY[0], Some("rad/sqrt(s)"), rotation),
             noise.optional_float(DENSITY[1], Some("m/sqrt(s)"), translation),

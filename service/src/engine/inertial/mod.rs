@@ -2,11 +2,11 @@
 
 use inekf::filter::{Alignment, Belief, InertialSide, Levelled, UpdateError, propagate_in_place};
 use inekf::lie::SO3;
-use inekf::model::{ImuInput, ImuNoise, InertialState};
+use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState};
 use inekf::smoother::Preintegration;
 use inekf_shared::message::{
-    EstimateSe23, HeadingFix, INPUT_IMU, ImuSample, MODEL_IMU, PositionFix, StateVector,
-    VelocityFix, Zero,
+    EstimateSe23, HeadingFix, INPUT_IMU, ImuSample, MODEL_IMU, PositionFix, ProcessNoise,
+    StateVector, VelocityFix, Zero,
 };
 use nalgebra::Vector3;
 
@@ -16,11 +16,12 @@ use super::levelling::Levelling;
 use super::model::{Fused, Model, Preceding};
 use super::output::write_triangle;
 use super::recovery::Widening;
+use super::resume::Doubt;
 use super::settings::{
     FusionSettings, ImuSettings, InitialSettings, LevelSource, Settings, seconds,
 };
 use super::tally::Refusal;
-use crate::config::Hold;
+use crate::config::{Hold, InertialNoise};
 
 pub mod aiding;
 mod intake;
@@ -193,6 +194,35 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
             self.imu.discretisation,
             &motion.noise,
         );
+    }
+
+    /// One step of propagation, whatever the discretisation of the samples: the rates are constant over it.
+    fn endure(&self, belief: &mut Belief<G, S, D>, silence_ns: u64, doubt: &Doubt) {
+        if silence_ns == 0 {
+            return;
+        }
+        let mean = &belief.mean;
+        let weight_b = mean.pose().rotation.inverse_rotate(&self.imu.g_w);
+        let coasting = ImuInput {
+            omega_b: mean.gyro_bias(),
+            force_b: mean.accel_bias() - weight_b,
+        };
+        propagate_in_place(
+            belief,
+            &coasting,
+            &self.imu.g_w,
+            seconds(silence_ns),
+            Discretisation::ZeroOrderHold,
+            &self.imu.noise_of_silence(silence_ns, doubt),
+        );
+    }
+
+    fn reload_noise(&mut self, noise: &ProcessNoise) -> Result<(), &'static str> {
+        let noise = InertialNoise::from_numbers(noise)?;
+        self.imu.white = noise.white;
+        self.imu.gyro_bias_walk = noise.gyro_bias_walk;
+        self.imu.accel_bias_walk = noise.accel_bias_walk;
+        Ok(())
     }
 
     fn is_sound(&self, belief: &Belief<G, S, D>) -> bool {

@@ -75,6 +75,7 @@ fn rows(config: &Config, odometry: &OdometryConfig) -> RowSettings {
         },
         first_period_ns: rows.first_period_ns(),
         noise: odometry.noise.scaled(noise_factor(config)),
+        noise_factor: noise_factor(config),
     }
 }
 
@@ -197,8 +198,8 @@ impl Plan<'_> {
         user: U,
     ) -> Result<U::Output, UpdateError>
     where
-        G: Vehicle<D, N>,
-        F: PoseFilter<G, D, N>,
+        G: Vehicle<D, N> + 'static,
+        F: PoseFilter<G, D, N> + 'static,
     {
         let model = Odometry::<G, F, D, N, PAIR>::new(self.rows, self.initial, self.fusion, filter);
         Ok(user.with(Engine::of(model, self.fusion)))
@@ -210,7 +211,7 @@ impl Plan<'_> {
         user: U,
     ) -> Result<U::Output, UpdateError>
     where
-        G: Vehicle<D, N>,
+        G: Vehicle<D, N> + 'static,
     {
         match self.config.invariance {
             Some(Invariance::Left) => {
@@ -229,7 +230,7 @@ impl Plan<'_> {
         &self,
     ) -> Result<Single<S, D>, UpdateError>
     where
-        G: Vehicle<D, N>,
+        G: Vehicle<D, N> + 'static,
         S: Side,
     {
         let mut outputs = SourceMismatches::default();
@@ -265,7 +266,7 @@ impl Plan<'_> {
         single: &Single<S, D>,
     ) -> Result<(), UpdateError>
     where
-        G: Vehicle<D, N>,
+        G: Vehicle<D, N> + 'static,
         S: Side,
     {
         let sources = &self.fusion.sources[FixKind::Position as usize];

@@ -11,7 +11,8 @@ use core::fmt::Debug;
 use inekf::filter::{Alignment, Belief, Covariance, UpdateError};
 use inekf::lie::SO3;
 use inekf_shared::message::{
-    EstimateMessage, PositionFix, REASON_NOT_FINITE, REASON_OUT_OF_RANGE, StateVector, model_name,
+    EstimateMessage, PositionFix, ProcessNoise, REASON_NOT_FINITE, REASON_OUT_OF_RANGE,
+    StateVector, model_name,
 };
 use inekf_shared::transport::InputMessage;
 use nalgebra::{SMatrix, Vector3};
@@ -19,6 +20,7 @@ use nalgebra::{SMatrix, Vector3};
 use super::fix::{Fix, Measurement};
 use super::model::{Fused, Model, Preceding};
 use super::recovery::Widening;
+use super::resume::Doubt;
 use super::set_state::{checked_attitude, covariance};
 use super::settings::{FusionSettings, InitialSettings, LevelSource};
 use super::tally::Refusal;
@@ -53,6 +55,8 @@ pub struct RowSettings {
     pub first_period_ns: u64,
     /// How rows are trusted.
     pub noise: OdometryNoise,
+    /// What the configured noise was multiplied by to give it.
+    pub noise_factor: f64,
 }
 
 /// A filter F on the pose G, moved by odometry. `PAIR = 2 N` is the dimension of two positions.
@@ -192,6 +196,19 @@ where
     fn advance(&self, state: &mut F::State, motion: &RowMotion<G, D>, part_ns: u64) {
         let (step, q) = motion.part(part_ns);
         self.filter.advance(state, &step, &q);
+    }
+
+    fn endure(&self, state: &mut F::State, silence_ns: u64, doubt: &Doubt) {
+        if silence_ns > 0 {
+            let (step, q) = RowMotion::of_silence(silence_ns, &self.rows.noise, doubt);
+            self.filter.advance(state, &step, &q);
+        }
+    }
+
+    fn reload_noise(&mut self, noise: &ProcessNoise) -> Result<(), &'static str> {
+        let noise = OdometryNoise::from_numbers(noise)?;
+        self.rows.noise = noise.scaled(self.rows.noise_factor);
+        Ok(())
     }
 
     fn is_sound(&self, state: &F::State) -> bool {

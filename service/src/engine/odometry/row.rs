@@ -7,6 +7,7 @@
 use inekf::model::{OdometryStep, RigidPose};
 use nalgebra::{SMatrix, SVector};
 
+use super::super::resume::Doubt;
 use super::super::settings::seconds;
 use crate::config::OdometryNoise;
 
@@ -122,6 +123,24 @@ impl<G, const D: usize> RowMotion<G, D> {
             span_ns: row.span_ns,
             doubt,
         }
+    }
+
+    /// `silence_ns` nanoseconds in which nothing was heard: the body stays, as far as anyone knows.
+    pub fn of_silence<const N: usize>(
+        silence_ns: u64,
+        noise: &OdometryNoise,
+        doubt: &Doubt,
+    ) -> (OdometryStep<G>, SMatrix<f64, D, D>)
+    where
+        G: RigidPose<D, N>,
+    {
+        let dt_s = seconds(silence_ns);
+        let still = SVector::zeros();
+        let square = |sigma: f64| (sigma * dt_s) * (sigma * dt_s);
+        let way = square(doubt.speed_sigma);
+        let q = covariance::<G, D, N>(noise, &still, dt_s)
+            + diagonal::<G, D, N>(square(doubt.turn_sigma), way, way);
+        (OdometryStep::new(&still, dt_s), q)
     }
 
     /// The next `part_ns` nanoseconds of it: a step and the covariance of its noise.

@@ -1,0 +1,69 @@
+//! Recordings: everything that a daemon took, in its order, and every estimate that came of it.
+//!
+//! A recording is one file of frames ([`inekf_shared::codec`]: magic, version, length, CRC), written from front to back
+//! and never changed: first a [`Head`] with the text of the configuration, then the entries of the journal and the
+//! estimates, each in their own order. If its writer is killed or the disk is full, all but the last frame is good.
+//!
+//! * [`write`]: the file as it grows; [`read`]: what there is of it, whatever its bytes are
+//! * [`record`]: from a running daemon to a file; [`replay`]: from a file through a daemon of its own, and the comparison
+
+pub mod read;
+pub mod record;
+pub mod replay;
+pub mod write;
+
+use inekf_shared::message::{JOURNAL_PAYLOAD_LEN, JournalEntry};
+use serde::{Deserialize, Serialize};
+
+pub use read::{Item, Reader};
+pub use record::{RecordOptions, RecordSummary, record};
+pub use replay::{RerunOptions, RerunSummary, rerun};
+pub use write::Writer;
+
+/// Version of what is in the frames.
+pub const RECORDING_VERSION: u32 = 1;
+
+/// What a recording begins with.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Head {
+    /// [`RECORDING_VERSION`].
+    pub version: u32,
+    /// `MODEL_*` code: the type of the estimates.
+    pub model: u32,
+    /// Name of the instance that was recorded.
+    pub instance: String,
+    /// When the recording began, seconds since 1970-01-01 UTC.
+    pub began_unix_s: u64,
+    /// The text of the daemon's configuration.
+    pub config: String,
+}
+
+/// An entry of the journal without the bytes that its message does not use.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Counts the entries of one daemon, from 0.
+    pub index: u64,
+    /// How many estimates had been published when it was done with.
+    pub estimates: u64,
+    /// `JOURNAL_*` kind.
+    pub kind: u32,
+    /// The bytes of the message.
+    pub message: Vec<u8>,
+}
+
+impl Entry {
+    /// What is kept of an entry.
+    pub fn of(entry: &JournalEntry) -> Self {
+        Self {
+            index: entry.index,
+            estimates: entry.estimates,
+            kind: entry.kind,
+            message: entry.message().to_vec(),
+        }
+    }
+
+    /// Whether it is one that a daemon could have published.
+    pub fn is_sound(&self) -> bool {
+        self.message.len() <= JOURNAL_PAYLOAD_LEN
+    }
+}

@@ -1,0 +1,216 @@
+//! What there is of a recording, whatever its bytes are.
+//!
+//! A frame that is cut short or damaged is left out and counted, and reading goes on at the next good one. So no damage
+//! changes what is read: it can only make it less, and the numbers of entries and estimates show what is missing.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use inekf_shared::codec::{
+    self, CodecError, FRAME_ENTRY, FRAME_ESTIMATE, FRAME_HEADER_LEN, FRAME_MAGIC, FRAME_RECORDING,
+};
+use inekf_shared::message::EstimateMessage;
+
+use super::{Entry, Head, RECORDING_VERSION};
+
+/// Bytes that are read at a time.
+const CHUNK: usize = 64 * 1024;
+/// A frame of a recording is shorter: a head with the longest configuration.
+const MAX_FRAME: usize = 2 * 1024 * 1024;
+
+/// One frame of a recording.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "they are looked at one by one")]
+pub enum Item<E> {
+    /// An entry of the journal.
+    Entry(Entry),
+    /// An estimate.
+    Estimate(E),
+}
+
+/// What could not be read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Damage {
+    /// Places in the middle where bytes were left out.
+    pub places: u64,
+    /// Bytes left out there.
+    pub bytes: u64,
+    /// Bytes of an unfinished frame at the end.
+    pub torn: u64,
+}
+
+/// Reads a recording from front to back.
+#[derive(Debug)]
+pub struct Reader<R = File> {
+    source: R,
+    /// What has been read of the source and not yet been decoded.
+    buffer: Vec<u8>,
+    /// Where in the buffer the next frame begins.
+    at: usize,
+    at_end: bool,
+    head: Head,
+    damage: Damage,
+}
+
+impl Reader {
+    /// Opens the recording at `path`.
+    ///
+    /// # Errors
+    /// It cannot be read, or does not begin like a recording of this version.
+    pub fn open(path: &Path) -> anyhow::Result<Self> {
+        let opened = File::open(path).map_err(anyhow::Error::from);
+        opened
+            .and_then(Reader::new)
+            .with_context(|| path.display().to_string())
+    }
+}
+
+impl<R: Read> Reader<R> {
+    /// Reads a recording from `source`.
+    ///
+    /// # Errors
+    /// As [`Reader::open`].
+    pub fn new(source: R) -> anyhow::Result<Self> {
+        let mut reader = Self {
+            source,
+            buffer: Vec::new(),
+            at: 0,
+            at_end: false,
+            head: Head {
+                version: 0,
+                model: 0,
+                instance: String::new(),
+                began_unix_s: 0,
+                config: String::new(),
+            },
+            damage: Damage::default(),
+        };
+        let kind = reader.kind_here()?;
+        let (head, len) = kind
+            .and_then(|_| codec::decode_prefix::<Head>(FRAME_RECORDING, reader.rest()))
+            .context("this is no recording, or its beginning is damaged")?;
+        if head.version != RECORDING_VERSION {
+            bail!(
+                "the recording has version {}, this program reads version {RECORDING_VERSION}",
+                head.version
+            );
+        }
+        reader.at += len;
+        reader.head = head;
+        Ok(reader)
+    }
+
+    /// What the recording begins with.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// What could not be read so far.
+    pub fn damage(&self) -> Damage {
+        self.damage
+    }
+
+    /// The next frame that is good; `None` at the end. Estimates are taken to be `E`, which is the head's model.
+    ///
+    /// # Errors
+    /// The source cannot be read.
+    pub fn next_item<E: EstimateMessage>(&mut self) -> io::Result<Option<Item<E>>> {
+        let mut left_out = 0;
+        loop {
+            if let Some((item, len)) = self.item_here()? {
+                self.at += len;
+                if left_out > 0 {
+                    self.damage.places += 1;
+                    self.damage.bytes += left_out;
+                }
+                return Ok(Some(item));
+            }
+            if self.rest().is_empty() && self.at_end {
+                self.damage.torn += left_out;
+                return Ok(None);
+            }
+            left_out += self.skip()?;
+        }
+    }
+
+    /// The item that begins here, with its length, if there is one.
+    fn item_here<E: EstimateMessage>(&mut self) -> io::Result<Option<(Item<E>, usize)>> {
+        let Ok(kind) = self.kind_here()? else {
+            return Ok(None);
+        };
+        let rest = self.rest();
+        Ok(match kind {
+            FRAME_ENTRY => codec::decode_prefix::<Entry>(kind, rest)
+                .ok()
+                .filter(|(entry, _)| entry.is_sound())
+                .map(|(entry, len)| (Item::Entry(entry), len)),
+            FRAME_ESTIMATE => codec::decode_prefix::<E>(kind, rest)
+                .ok()
+                .map(|(estimate, len)| (Item::Estimate(estimate), len)),
+            _ => None,
+        })
+    }
+
+    /// The kind of the frame that begins here, once all of it has been read.
+    fn kind_here(&mut self) -> io::Result<Result<u32, CodecError>> {
+        loop {
+            match codec::kind(self.rest()) {
+                Err(CodecError::TooShort { needed, .. }) if !self.at_end && needed <= MAX_FRAME => {
+                    self.read_more()?;
+                }
+                // Nothing says yet whether it begins like one.
+                Err(_) if self.rest().len() < FRAME_HEADER_LEN && !self.at_end => {
+                    self.read_more()?;
+                }
+                kind => return Ok(kind),
+            }
+        }
+    }
+
+    /// Skips to where a frame may begin, at least one byte on; says how many bytes these are.
+    fn skip(&mut self) -> io::Result<u64> {
+        let mut skipped = 0;
+        loop {
+            let rest = self.rest();
+            let from = rest.get(1..).unwrap_or_default();
+            let found = from
+                .windows(FRAME_MAGIC.len())
+                .position(|window| window == FRAME_MAGIC);
+            // The last bytes may be the beginning of one.
+            let on = match found {
+                Some(position) => position + 1,
+                None if self.at_end => rest.len(),
+                None => rest
+                    .len()
+                    .saturating_sub(FRAME_MAGIC.len() - 1)
+                    .max(1)
+                    .min(rest.len()),
+            };
+            self.at += on;
+            skipped += on as u64;
+            if found.is_some() || self.at_end {
+                return Ok(skipped);
+            }
+            self.read_more()?;
+            if self.rest().starts_with(&FRAME_MAGIC) {
+                return Ok(skipped);
+            }
+        }
+    }
+
+    fn rest(&self) -> &[u8] {
+        &self.buffer[self.at..]
+    }
+
+    fn read_more(&mut self) -> io::Result<()> {
+        self.buffer.drain(..self.at);
+        self.at = 0;
+        let before = self.buffer.len();
+        let mut part = (&mut self.source).take(CHUNK as u64);
+        part.read_to_end(&mut self.buffer)?;
+        self.at_end = self.buffer.len() == before;
+        Ok(())
+    }
+}

@@ -1,0 +1,410 @@
+//! From a recording through a daemon of its own: every estimate must come again, bit for bit.
+//!
+//! The daemon is started with the recorded configuration, and given the entries one by one, in their order, by requests
+//! (`inekf-service --stepped`): nothing depends on when a message comes. Only the latency stamps `received_ns` and
+//! `published_ns` are not compared.
+//!
+//! A recording from the daemon's first entry on determines everything. One that begins later, or has a gap, determines
+//! the estimates again from the next entry on that fixes the state: a reset, or a state that is set after two samples
+//! (what the engine keeps of the samples before is then known as well). From there on all is compared but what counts
+//! from the daemon's start: numbers, counters, the last NIS, and the first announcement of the reset.
+
+use std::fs;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use inekf_shared::message::{
+    CONTROL_RESET, CONTROL_SET_STATE, CONTROL_TAKE, ControlRequest, Counters, ESTIMATE_RESET,
+    ESTIMATE_RESUMED, EstimateSe2, EstimateSe3, EstimateSe23, JOURNAL_CONTROL, JOURNAL_IMU,
+    JOURNAL_ODOMETRY_2D, JOURNAL_ODOMETRY_3D, JOURNAL_RESUME, MAX_INPUT_LEN, MAX_SOURCES, Message,
+    StateVector, Zero,
+};
+use inekf_shared::topic::Instance;
+
+use super::read::{Damage, Item, Reader};
+use super::{Entry, Head};
+use crate::control::{ControlError, Controller};
+use crate::daemon::{Daemon, private_instance};
+use crate::model::{Estimate, Model};
+use crate::read::EstimateReader;
+use crate::replay::Output;
+
+/// How long the daemon may take for one entry.
+const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+/// Samples after which what the engine keeps of them does not depend on those before: the time that a row of odometry
+/// speaks for is bounded by that of the row before.
+const SAMPLES_KEPT: u64 = 2;
+
+/// What to replay.
+#[derive(Clone, Debug)]
+pub struct RerunOptions {
+    /// The recording.
+    pub recording: PathBuf,
+    /// The estimate CSV to write.
+    pub out: PathBuf,
+    /// Whether it has the covariance.
+    pub covariance: bool,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RerunSummary {
+    /// Entries given to the daemon.
+    pub entries: u64,
+    /// Estimates that were compared and found equal.
+    pub equal: u64,
+    /// Estimates of the replay that the recording does not have.
+    pub unrecorded: u64,
+    /// Entries given while nothing fixed the state: no estimate of theirs was compared.
+    pub skipped: u64,
+    /// Entries that are missing: index of the one before, and how many.
+    pub gaps: Vec<(u64, u64)>,
+    /// Bytes that could not be read.
+    pub damage: Damage,
+    /// Whether all was compared from the daemon's first entry on.
+    pub whole: bool,
+    /// Rows written.
+    pub rows: usize,
+    /// The first estimate that was not equal, or came too many or too few.
+    pub difference: Option<String>,
+}
+
+/// Replays.
+///
+/// # Errors
+/// The recording cannot be read, or the daemon not be started; a difference is no error here.
+pub fn rerun(options: &RerunOptions) -> anyhow::Result<RerunSummary> {
+    let head = Reader::open(&options.recording)?.head().clone();
+    let model = Model::from_code(head.model).context("the recording is of an unknown model")?;
+    let folder = tempfile::tempdir().context("making a folder for the configuration")?;
+    let config = folder.path().join("recorded.toml");
+    fs::write(&config, &head.config).context("writing the recorded configuration")?;
+    let instance = private_instance("rerun")?;
+    let daemon = Daemon::start_stepped(&config, &instance)?;
+    let summary = match model {
+        Model::Imu => run::<EstimateSe23>(options, &instance),
+        Model::Odometry3d => run::<EstimateSe3>(options, &instance),
+        Model::Odometry2d => run::<EstimateSe2>(options, &instance),
+    };
+    let stopped = daemon.stop();
+    let summary = summary?;
+    stopped?;
+    Ok(summary)
+}
+
+fn run<E: Estimate>(options: &RerunOptions, instance: &Instance) -> anyhow::Result<RerunSummary> {
+    let mut daemon = Stepped::<E>::open(instance)?;
+    let mut entries = Reader::open(&options.recording)?;
+    let mut recorded = Recorded::<E>::open(options)?;
+    let mut output = Output::new(&options.out, options.covariance)?;
+    let mut summary = RerunSummary::default();
+    let mut trust = Trust::Nothing { samples: 0 };
+    let mut next = None;
+    while let Some(item) = entries.next_item::<E>().context("reading the recording")? {
+        let Item::Entry(entry) = item else { continue };
+        match next {
+            None if entry.index == 0 => {
+                trust = Trust::Everything;
+                summary.whole = true;
+            }
+            None => {}
+            Some(expected) if entry.index == expected => {}
+            Some(expected) if entry.index > expected => {
+                summary.gaps.push((expected - 1, entry.index - expected));
+                trust = Trust::Nothing { samples: 0 };
+            }
+            Some(_) => bail!("the recording is of more than one life of a daemon"),
+        }
+        next = Some(entry.index + 1);
+        summary.entries += 1;
+        let (estimates, done) = daemon.take(&entry)?;
+        let was = trust;
+        trust = trust.after(&entry, done, daemon.published);
+        if !was.compares() {
+            summary.skipped += 1;
+            continue;
+        }
+        for estimate in &estimates {
+            output.take(estimate)?;
+            let seq = trust.recorded_seq(estimate.head().estimate_seq);
+            match recorded.find(seq)? {
+                None => summary.unrecorded += 1,
+                Some(theirs) if trust.comparable(estimate) == trust.comparable(&theirs) => {
+                    summary.equal += 1;
+                }
+                Some(theirs) => {
+                    summary.difference = Some(format!(
+                        "the estimate {seq} differs, at {} ns, after entry {}: {}",
+                        theirs.head().stamp_ns,
+                        entry.index,
+                        where_apart(&trust.comparable(&theirs), &trust.comparable(estimate)),
+                    ));
+                }
+            }
+            if summary.difference.is_some() {
+                break;
+            }
+        }
+        if summary.difference.is_none() && trust.recorded_seq(daemon.published) != entry.estimates {
+            summary.difference = Some(format!(
+                "after entry {} there were {} estimates, now there are {}",
+                entry.index,
+                entry.estimates,
+                trust.recorded_seq(daemon.published),
+            ));
+        }
+        if summary.difference.is_some() {
+            break;
+        }
+    }
+    summary.damage = entries.damage();
+    summary.rows = output.finish()?;
+    Ok(summary)
+}
+
+/// How far what is known determines the estimates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Trust {
+    /// Nothing has fixed the state since the beginning or the last gap, and so many samples have come.
+    Nothing { samples: u64 },
+    /// The state and all that follows; the recorded number of an estimate is its own plus `ahead`.
+    State { ahead: i128 },
+    /// Every byte.
+    Everything,
+}
+
+impl Trust {
+    fn compares(self) -> bool {
+        !matches!(self, Self::Nothing { .. })
+    }
+
+    /// What is known after an entry, which was `done` or refused; `published` estimates have come of all so far.
+    fn after(self, entry: &Entry, done: bool, published: u64) -> Self {
+        let Self::Nothing { samples } = self else {
+            return self;
+        };
+        let fixed = Self::State {
+            ahead: i128::from(entry.estimates) - i128::from(published),
+        };
+        let samples = match entry.kind {
+            JOURNAL_IMU | JOURNAL_ODOMETRY_2D | JOURNAL_ODOMETRY_3D => samples + 1,
+            _ => samples,
+        };
+        match request_of(entry).map(|request| request.kind) {
+            Some(CONTROL_RESET) => fixed,
+            Some(CONTROL_SET_STATE) if done && samples >= SAMPLES_KEPT => fixed,
+            _ => Self::Nothing { samples },
+        }
+    }
+
+    /// The number of an estimate in the recording.
+    fn recorded_seq(self, seq: u64) -> u64 {
+        match self {
+            Self::State { ahead } => u64::try_from(i128::from(seq) + ahead).unwrap_or(u64::MAX),
+            Self::Nothing { .. } | Self::Everything => seq,
+        }
+    }
+
+    /// The bytes of an estimate that are determined.
+    fn comparable<E: Estimate>(self, estimate: &E) -> Vec<u8> {
+        let mut known = *estimate;
+        let head = known.head_mut();
+        (head.received_ns, head.published_ns) = (0, 0);
+        if let Self::State { .. } = self {
+            (head.estimate_seq, head.reset_count, head.reset_jump_m) = (0, 0, 0.0);
+            head.flags &= !(ESTIMATE_RESET | ESTIMATE_RESUMED);
+            head.counters = Counters::ZERO;
+            head.nis = [0.0; MAX_SOURCES];
+        }
+        known.as_bytes().to_vec()
+    }
+}
+
+/// The request that an entry is.
+fn request_of(entry: &Entry) -> Option<ControlRequest> {
+    (entry.kind == JOURNAL_CONTROL)
+        .then(|| ControlRequest::from_bytes(&entry.message))
+        .flatten()
+}
+
+/// Where two estimates begin to differ.
+fn where_apart(recorded: &[u8], now: &[u8]) -> String {
+    let at = recorded
+        .iter()
+        .zip(now)
+        .position(|(one, other)| one != other);
+    let at = at.unwrap_or_default() / 8 * 8;
+    let word = |bytes: &[u8]| -> u64 {
+        let bytes = bytes
+            .get(at..at + 8)
+            .and_then(|bytes| bytes.try_into().ok());
+        bytes.map_or(0, u64::from_le_bytes)
+    };
+    format!(
+        "at byte {at} there was {:016x}, now there is {:016x}",
+        word(recorded),
+        word(now)
+    )
+}
+
+/// A daemon that is fed by requests.
+struct Stepped<E: Estimate> {
+    controller: Controller,
+    reader: EstimateReader<E>,
+    /// The number of its last estimate.
+    published: u64,
+}
+
+impl<E: Estimate> Stepped<E> {
+    fn open(instance: &Instance) -> anyhow::Result<Self> {
+        let reader = EstimateReader::open(instance)?;
+        let mut controller = Controller::open(instance, ANSWER_WITHIN)?;
+        controller.barrier()?;
+        Ok(Self {
+            controller,
+            reader,
+            published: 0,
+        })
+    }
+
+    /// Gives the daemon an entry. What came of it, and whether it was not refused.
+    fn take(&mut self, entry: &Entry) -> anyhow::Result<(Vec<E>, bool)> {
+        let answer = match request_of(entry) {
+            // It was refused then.
+            Some(request) if request.kind == CONTROL_TAKE => return Ok((Vec::new(), false)),
+            Some(request) => self.controller.send(request),
+            None => self.controller.send(as_request(entry)?),
+        };
+        let done = match answer {
+            Ok(_) => true,
+            Err(ControlError::Refused { .. }) if entry.kind == JOURNAL_CONTROL => false,
+            Err(error) => return Err(error).context(format!("replaying entry {}", entry.index)),
+        };
+        let mut estimates = Vec::new();
+        while let Some(estimate) = self.reader.next_estimate()? {
+            self.published = estimate.head().estimate_seq;
+            estimates.push(estimate);
+        }
+        if self.reader.missed() > 0 {
+            bail!("estimates were lost: this process was held up for too long");
+        }
+        Ok((estimates, done))
+    }
+}
+
+/// The request that has the daemon take an entry.
+fn as_request(entry: &Entry) -> anyhow::Result<ControlRequest> {
+    let mut request = ControlRequest {
+        kind: CONTROL_TAKE,
+        argument: entry.kind,
+        ..ControlRequest::ZERO
+    };
+    let len = entry.message.len();
+    if entry.kind == JOURNAL_RESUME {
+        request.state = StateVector::from_bytes(&entry.message)
+            .with_context(|| format!("entry {} is no state", entry.index))?;
+    } else if len <= MAX_INPUT_LEN {
+        request.input[..len].copy_from_slice(&entry.message);
+    } else {
+        bail!("entry {} is longer than any input", entry.index);
+    }
+    Ok(request)
+}
+
+/// The recorded estimates, in their order.
+struct Recorded<E> {
+    reader: Reader,
+    next: Option<E>,
+}
+
+impl<E: Estimate> Recorded<E> {
+    fn open(options: &RerunOptions) -> anyhow::Result<Self> {
+        Ok(Self {
+            reader: Reader::open(&options.recording)?,
+            next: None,
+        })
+    }
+
+    /// The estimate of this number, if it is there; numbers must grow.
+    fn find(&mut self, seq: u64) -> anyhow::Result<Option<E>> {
+        loop {
+            if let Some(next) = &self.next {
+                match next.head().estimate_seq {
+                    number if number == seq => return Ok(self.next.take()),
+                    number if number > seq => return Ok(None),
+                    _ => {}
+                }
+            }
+            let item = self
+                .reader
+                .next_item::<E>()
+                .context("reading the recording")?;
+            match item {
+                Some(Item::Estimate(estimate)) => self.next = Some(estimate),
+                Some(Item::Entry(_)) => {}
+                None => {
+                    self.next = None;
+                    return Ok(None);
+                }
+            }
+        }
+    }
+}
+
+impl RerunSummary {
+    /// What there is to say about it, a line each.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let equal = match &self.difference {
+            None => format!("{} estimates, bit for bit equal", self.equal),
+            Some(difference) => format!(
+                "{} estimates, bit for bit equal, then {difference}",
+                self.equal
+            ),
+        };
+        lines.push(equal);
+        if self.skipped > 0 {
+            lines.push(format!(
+                "skipped  {} entries up to one that fixes the state; since then all is compared but numbers and counters",
+                self.skipped
+            ));
+        }
+        for (after, count) in &self.gaps {
+            lines.push(format!("missing  {count} entries after entry {after}"));
+        }
+        if self.unrecorded > 0 {
+            let count = self.unrecorded;
+            lines.push(format!("missing  {count} estimates in the recording"));
+        }
+        let Damage {
+            places,
+            bytes,
+            torn,
+        } = self.damage;
+        if places > 0 {
+            lines.push(format!("damaged  {bytes} bytes in {places} places"));
+        }
+        if torn > 0 {
+            lines.push(format!("torn     {torn} bytes at the end"));
+        }
+        lines
+    }
+}
+
+/// Whether the recording could be compared at all, and was equal.
+///
+/// # Errors
+/// One line that says why not.
+pub fn require_equal(summary: &RerunSummary, head: &Head) -> anyhow::Result<()> {
+    if let Some(difference) = &summary.difference {
+        bail!("the replay is not the recording: {difference}");
+    }
+    if summary.equal == 0 {
+        bail!(
+            "nothing could be compared: of the recording of instance {} no entry fixes the state, or it has no estimates",
+            head.instance
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,274 @@
+//! The checkpoint: the newest state on disk, about once a second and at the stop, for the next start.
+//!
+//! The estimation thread only copies the state into a slot ([`handover`]); a thread of its own encodes it and writes the
+//! file ([`mod@file`]). However slow the disk is and whatever it refuses, the estimate goes on: a failure is counted, and
+//! said in the log once until it works again. What the next start does with the state is
+//! [`crate::engine::resume`]'s.
+
+pub mod file;
+pub mod handover;
+
+use core::time::Duration;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::thread;
+
+use anyhow::Context;
+use inekf_shared::message::{StateVector, Zero};
+use tracing::{info, warn};
+
+use file::Identity;
+use handover::{Giver, Taker};
+
+/// How long the last checkpoint may take at the stop.
+const LAST_WITHIN: Duration = Duration::from_secs(1);
+/// The writer looks for a new state as often as this, or sooner.
+const LOOK_EVERY: Duration = Duration::from_millis(250);
+/// And no sooner than this.
+const LOOK_NO_SOONER: Duration = Duration::from_millis(2);
+
+/// What has been written, and what could not be.
+#[derive(Debug, Default)]
+struct Counts {
+    written: AtomicU64,
+    failed: AtomicU64,
+}
+
+/// Keeps the checkpoint of a running daemon. It belongs to the estimation thread.
+#[derive(Debug)]
+pub struct Keeper {
+    giver: Giver<StateVector>,
+    given: StateVector,
+    period_ns: u64,
+    next_ns: u64,
+    counts: Arc<Counts>,
+    last: Sender<Option<StateVector>>,
+    ended: Receiver<()>,
+}
+
+impl Keeper {
+    /// Starts the thread that writes to `path`; `now_ns` is CLOCK_MONOTONIC.
+    ///
+    /// # Errors
+    /// There is no thread to be had.
+    pub fn start(
+        path: PathBuf,
+        identity: Identity,
+        period_ns: u64,
+        now_ns: u64,
+    ) -> anyhow::Result<Self> {
+        let (giver, taker) = handover::pair(StateVector::ZERO);
+        let (last, when_last) = mpsc::channel();
+        let (end, ended) = mpsc::channel();
+        let counts = Arc::new(Counts::default());
+        let mut writer = Writer {
+            path,
+            identity,
+            counts: Arc::clone(&counts),
+            fails: false,
+        };
+        let look = Duration::from_nanos(period_ns / 4).clamp(LOOK_NO_SOONER, LOOK_EVERY);
+        thread::Builder::new()
+            .name("checkpoint".to_owned())
+            .spawn(move || {
+                writer.run(taker, &when_last, look);
+                // Nobody may wait for it any more.
+                let _ = end.send(());
+            })
+            .context("starting the thread that writes the checkpoint")?;
+        Ok(Self {
+            giver,
+            given: StateVector::ZERO,
+            period_ns,
+            next_ns: now_ns,
+            counts,
+            last,
+            ended,
+        })
+    }
+
+    /// Takes the state for a checkpoint, if one is due at `now_ns` (CLOCK_MONOTONIC) and `state` has another than the
+    /// last. Neither waits nor allocates.
+    pub fn keep(&mut self, now_ns: u64, state: impl FnOnce() -> Option<StateVector>) {
+        if now_ns < self.next_ns {
+            return;
+        }
+        self.next_ns = now_ns.saturating_add(self.period_ns);
+        if let Some(state) = state().filter(|state| *state != self.given) {
+            self.given = state;
+            self.giver.give(&state);
+        }
+    }
+
+    /// Checkpoints written, and those that could not be.
+    pub fn counts(&self) -> (u64, u64) {
+        let of = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        (of(&self.counts.written), of(&self.counts.failed))
+    }
+
+    /// Writes the last checkpoint, and waits for it, but not for long. Without a state the file stays as it is.
+    pub fn finish(self, state: Option<StateVector>) {
+        let _ = self.last.send(state);
+        if let Err(RecvTimeoutError::Timeout) = self.ended.recv_timeout(LAST_WITHIN) {
+            warn!("the disk is slow: the last checkpoint is given up");
+        }
+    }
+}
+
+/// What the thread does.
+struct Writer {
+    path: PathBuf,
+    identity: Identity,
+    counts: Arc<Counts>,
+    /// Whether the last one failed.
+    fails: bool,
+}
+
+impl Writer {
+    fn run(
+        &mut self,
+        mut taker: Taker<StateVector>,
+        last: &Receiver<Option<StateVector>>,
+        look: Duration,
+    ) {
+        loop {
+            match last.recv_timeout(look) {
+                Err(RecvTimeoutError::Timeout) => {
+                    if let Some(state) = taker.take() {
+                        self.write(&state);
+                    }
+                }
+                Ok(state) => {
+                    if let Some(state) = state {
+                        self.write(&state);
+                    }
+                    return;
+                }
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn write(&mut self, state: &StateVector) {
+        let outcome = file::encode(&self.identity, state)
+            .map_err(anyhow::Error::from)
+            .and_then(|bytes| Ok(file::store(&self.path, &bytes)?));
+        let path = self.path.display();
+        match outcome {
+            Ok(()) => {
+                self.counts.written.fetch_add(1, Ordering::Relaxed);
+                if core::mem::take(&mut self.fails) {
+                    info!(%path, "checkpoints are written again");
+                }
+            }
+            Err(error) => {
+                self.counts.failed.fetch_add(1, Ordering::Relaxed);
+                if !core::mem::replace(&mut self.fails, true) {
+                    warn!(%path, "checkpoints cannot be written, the estimate goes on: {error:#}");
+                }
+            }
+        }
+    }
+}
+
+/// The state of the last life, if there is a checkpoint that can be used; and whether there is one that cannot, of
+/// which the log then says why.
+pub fn last_state(path: &Path, identity: &Identity) -> Result<Option<StateVector>, Unused> {
+    match file::load(path, identity) {
+        Ok(None) => {
+            info!(path = %path.display(), "no checkpoint yet: starting as configured");
+            Ok(None)
+        }
+        Ok(state) => Ok(state),
+        Err(reason) => {
+            warn!(path = %path.display(), "checkpoint not used, starting as configured: {reason}");
+            Err(Unused)
+        }
+    }
+}
+
+/// There is a checkpoint, and it is not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unused;
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::time::Instant;
+
+    use inekf_shared::message::MODEL_IMU;
+
+    use super::*;
+
+    fn identity() -> Identity {
+        Identity {
+            instance: "car".to_owned(),
+            estimator: "inekf".to_owned(),
+            model: MODEL_IMU,
+            dimension: 9,
+        }
+    }
+
+    fn state(stamp_ns: u64) -> StateVector {
+        StateVector {
+            model: MODEL_IMU,
+            dimension: 9,
+            stamp_ns,
+            ..StateVector::ZERO
+        }
+    }
+
+    fn eventually(what: &str, mut holds: impl FnMut() -> bool) {
+        let started = Instant::now();
+        while !holds() {
+            assert!(started.elapsed() < Duration::from_secs(60), "{what}");
+            thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn a_checkpoint_is_kept_each_period_and_at_the_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("kept");
+        let mut keeper = Keeper::start(path.clone(), identity(), 1000, 5).unwrap();
+        keeper.keep(4, || panic!("it is not due"));
+        keeper.keep(5, || None);
+        keeper.keep(1005, || Some(state(7)));
+        keeper.keep(1900, || panic!("it is not due"));
+        eventually("written", || keeper.counts() == (1, 0));
+        assert_eq!(last_state(&path, &identity()), Ok(Some(state(7))));
+        // The same state is not written twice.
+        keeper.keep(2005, || Some(state(7)));
+        keeper.keep(3005, || Some(state(8)));
+        eventually("written", || keeper.counts() == (2, 0));
+        keeper.finish(Some(state(9)));
+        assert_eq!(last_state(&path, &identity()), Ok(Some(state(9))));
+
+        let keeper = Keeper::start(path.clone(), identity(), 1000, 5).unwrap();
+        keeper.finish(None);
+        assert_eq!(last_state(&path, &identity()), Ok(Some(state(9))));
+        fs::write(&path, b"torn").unwrap();
+        assert_eq!(last_state(&path, &identity()), Err(Unused));
+    }
+
+    #[test]
+    fn a_disk_that_refuses_is_counted_and_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let home = folder.path().join("home");
+        let mut keeper = Keeper::start(home.join("kept"), identity(), 1, 0).unwrap();
+        for n in 1..=3 {
+            keeper.keep(n * 10, || Some(state(n)));
+            eventually("failed", || keeper.counts() == (0, n));
+        }
+        fs::create_dir(&home).unwrap();
+        keeper.keep(100, || Some(state(4)));
+        eventually("written", || keeper.counts() == (1, 3));
+        keeper.finish(None);
+        assert_eq!(
+            last_state(&home.join("kept"), &identity()),
+            Ok(Some(state(4)))
+        );
+    }
+}

@@ -18,7 +18,9 @@ use inekf_client::recording::replay::require_equal;
 use inekf_client::recording::{Reader, RecordOptions, RerunOptions, record, rerun};
 use inekf_client::replay::{ReplayOptions, replay};
 use inekf_client::simulate::{Scenario, Simulation};
-use inekf_shared::message::{ControlResponse, Counters, reason_name, state_name};
+use inekf_shared::message::{
+    ControlResponse, Counters, StateVector, model_name, reason_name, state_name, triangle_index,
+};
 use inekf_shared::topic::Instance;
 
 /// Feeds, replays and measures the estimation daemon `inekf-service`.
@@ -373,9 +375,26 @@ fn run_control(arguments: &ControlArguments) -> anyhow::Result<()> {
         (Action::Pause, _) => said(controller.pause()?),
         (Action::Resume, _) => said(controller.unpause()?),
         (Action::Reset, _) => said(controller.reset()?),
-        (Action::Snapshot, _) => println!("{:#?}", controller.snapshot()?),
+        (Action::Snapshot, _) => print_state(&controller.snapshot()?),
         (Action::ReloadNoise, Some(noise)) => said(controller.reload_noise(noise)?),
         (Action::ReloadNoise, None) => {}
     }
     Ok(())
+}
+
+/// A state, a line for each part of it; standard deviations in the order of its error.
+fn print_state(state: &StateVector) {
+    let dimension = state.dimension as usize;
+    let sigmas: Vec<f64> = (0..dimension)
+        .filter_map(|i| triangle_index(i, i, dimension))
+        .filter_map(|index| Some(state.covariance.get(index)?.sqrt()))
+        .collect();
+    println!("model            {}", model_name(state.model));
+    println!("stamp_ns         {}", state.stamp_ns);
+    println!("q_wb             {:?}", state.q_wb);
+    println!("v_w_mps          {:?}", state.v_w_mps);
+    println!("p_w_m            {:?}", state.p_w_m);
+    println!("gyro_bias_rps    {:?}", state.gyro_bias_rps);
+    println!("accel_bias_mps2  {:?}", state.accel_bias_mps2);
+    println!("sigmas           {sigmas:?}");
 }

@@ -9,13 +9,16 @@ use common::{
     settings, stamp, state_on_circle, velocity,
 };
 use counting::allocations;
+use inekf_service::checkpoint::handover;
+use inekf_service::config::Checkpoint;
 use inekf_service::engine::Outbox;
+use inekf_service::engine::resume::{ResumeSettings, Resumption};
 use inekf_service::engine::settings::{LevelSource, PositionSource};
 use inekf_service::engine::tally::Refusal;
 use inekf_shared::message::{
-    EstimateSe23, Header, INPUT_ODOMETRY_2D, REASON_BAD_COVARIANCE, REASON_BUFFER_FULL,
-    REASON_NOT_FINITE, REASON_NOT_READY, REASON_OUT_OF_RANGE, REASON_STAMP_NOT_AFTER,
-    REASON_WRONG_MODEL, Zero,
+    EstimateSe23, Header, INPUT_ODOMETRY_2D, ProcessNoise, REASON_BAD_COVARIANCE,
+    REASON_BUFFER_FULL, REASON_NOT_FINITE, REASON_NOT_READY, REASON_OUT_OF_RANGE,
+    REASON_STAMP_NOT_AFTER, REASON_WRONG_MODEL, StateVector, Zero,
 };
 
 /// Keeps the last estimate, as a latest-value slot does.
@@ -135,6 +138,38 @@ fn requests_allocate_nothing() {
     });
     assert_eq!(allocated, 0);
     assert_eq!(outbox.0.head.reset_count, 10 + 4);
+}
+
+#[test]
+fn a_checkpoint_is_handed_over_and_an_earlier_state_continued_without_allocation() {
+    let (mut giver, mut taker) = handover::pair(StateVector::ZERO);
+    let earlier = state_on_circle(stamp(0), 1.0);
+    let resume = ResumeSettings::new(&Checkpoint::default());
+    let mut engine = Engine::new(settings());
+    let outbox = &mut Latest(EstimateSe23::ZERO);
+    let allocated = allocations(|| {
+        assert!(engine.resume_from(&earlier, resume).is_ok());
+        for k in 100..600 {
+            one_of_everything(&mut engine, k, outbox);
+            giver.give(&engine.snapshot().unwrap());
+            if k == 300 {
+                engine.pause();
+            }
+            if k == 320 {
+                engine.unpause();
+            }
+            assert!(engine.reload_noise(&ProcessNoise::UNGIVEN).is_err());
+        }
+    });
+    assert_eq!(allocated, 0);
+    assert_eq!(
+        engine.resumption(),
+        Resumption::Resumed {
+            age_ns: 100 * PERIOD_NS
+        }
+    );
+    let newest = taker.take().unwrap();
+    assert_eq!(newest.stamp_ns, engine.snapshot().unwrap().stamp_ns);
 }
 
 #[test]

@@ -4,8 +4,8 @@
 //! and never changed: first a [`Head`] with the text of the configuration, then the entries of the journal and the
 //! estimates, each in their own order. If its writer is killed or the disk is full, all but the last frame is good.
 //!
-//! * [`write`]: the file as it grows; [`read`]: what there is of it, whatever its bytes are
-//! * [`record`]: from a running daemon to a file; [`replay`]: from a file through a daemon of its own, and the comparison
+//! * [`mod@write`]: the file as it grows; [`read`]: what there is of it, whatever its bytes are
+//! * [`mod@record`]: from a running daemon to a file; [`replay`]: from a file through a daemon of its own, and the comparison
 
 pub mod read;
 pub mod record;

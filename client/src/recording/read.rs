@@ -22,7 +22,6 @@ const MAX_FRAME: usize = 2 * 1024 * 1024;
 
 /// One frame of a recording.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::large_enum_variant, reason = "they are looked at one by one")]
 pub enum Item<E> {
     /// An entry of the journal.
     Entry(Entry),

@@ -77,7 +77,8 @@ impl JournalPort {
         let entry = JournalEntry::new(self.next, estimates, kind, message);
         self.next += 1;
         let slot = self.ahead.take().or_else(|| publisher.loan_uninit().ok());
-        if !slot.is_some_and(|slot| slot.write_payload(entry).send().is_ok()) {
+        let sent = slot.is_some_and(|slot| slot.write_payload(entry).send().is_ok());
+        if !sent {
             self.failures += 1;
         }
         self.loan_ahead();

@@ -17,10 +17,6 @@ pub const PERIOD: u64 = 100_000_000;
 pub const START: u64 = 50_000_000_000;
 
 /// Anything that an engine is fed with.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "messages lie in vectors here, and states are few"
-)]
 #[derive(Clone, Copy, Debug)]
 pub enum Input {
     Plane(Odometry2d),

@@ -357,7 +357,7 @@ fn a_smoother_comes_again_bit_for_bit_however_its_fixes_met_its_samples() {
         let (first, second) = rows.split_at(rows.len() / 2);
         let mut estimates = feed_in_bursts(&mut link, first, &[1, 1, 30, 1, 1, 1]);
         link.controller.reset().expect("a reset");
-        estimates.extend(feed_in_bursts(&mut link, second, &[1, 1, 1, 1, 1, 9]));
+        estimates.extend(feed_in_bursts(&mut link, second, &[1]));
         link.controller.smoothed().expect("a window");
         drop(link);
         let recording = recorded.finish();
@@ -365,6 +365,7 @@ fn a_smoother_comes_again_bit_for_bit_however_its_fixes_met_its_samples() {
         let settled = entries.iter().filter(|entry| entry.kind == JOURNAL_SETTLE);
         let settled = settled.count();
         assert!(settled > 3, "{settled} of {}", entries.len());
+        println!("{settled} of {} entries settle", entries.len());
         assert_eq!(recording.assert_equal(wait), estimates.len() as u64);
     }
 }

@@ -3,23 +3,16 @@
 //! An entry is published once the engine is done with it, so that no estimate waits for it. Slots are loaned ahead, as
 //! those of estimates are.
 
-use core::mem::MaybeUninit;
-
-use iceoryx2::prelude::ipc;
-use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use inekf_shared::message::{ControlRequest, StateVector};
 use inekf_shared::message::{
     JOURNAL_CONTROL, JOURNAL_RESUME, JOURNAL_SETTLE, JournalEntry, Message,
 };
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Node, Publisher, TransportError};
-
-type Slot = SampleMutUninit<ipc::Service, MaybeUninit<JournalEntry>, ()>;
+use inekf_shared::transport::{self, Node, Outlet, TransportError};
 
 /// The topic, if the journal is asked for.
 pub struct JournalPort {
-    publisher: Option<Publisher<JournalEntry>>,
-    ahead: Option<Slot>,
+    topic: Option<Outlet<JournalEntry>>,
     next: u64,
     /// Entries that could not be published; the watch reports them.
     pub failures: u64,
@@ -31,23 +24,23 @@ impl JournalPort {
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
     pub fn open(node: &Node, instance: &Instance, publish: bool) -> Result<Self, TransportError> {
-        let publisher = match publish {
-            true => Some(transport::journal(node, instance)?.publisher()?),
+        let topic = match publish {
+            true => Some(Outlet::new(
+                transport::journal(node, instance)?.publisher()?,
+                1,
+            )),
             false => None,
         };
-        let mut port = Self {
-            publisher,
-            ahead: None,
+        Ok(Self {
+            topic,
             next: 0,
             failures: 0,
-        };
-        port.loan_ahead();
-        Ok(port)
+        })
     }
 
     /// Whether entries are published.
     pub fn is_on(&self) -> bool {
-        self.publisher.is_some()
+        self.topic.is_some()
     }
 
     /// Notes an input of the topic with the `INPUT_*` index `input`; `estimates` have been published by now.
@@ -71,23 +64,14 @@ impl JournalPort {
     }
 
     fn note(&mut self, estimates: u64, kind: u32, message: &[u8]) {
-        let Some(publisher) = &self.publisher else {
+        let Some(topic) = &mut self.topic else {
             return;
         };
         let entry = JournalEntry::new(self.next, estimates, kind, message);
         self.next += 1;
-        let slot = self.ahead.take().or_else(|| publisher.loan_uninit().ok());
-        let sent = slot.is_some_and(|slot| slot.write_payload(entry).send().is_ok());
-        if !sent {
+        if topic.send(&entry).is_err() {
             self.failures += 1;
         }
-        self.loan_ahead();
-    }
-
-    /// Loans the slot for the next entry.
-    fn loan_ahead(&mut self) {
-        if let Some(publisher) = &self.publisher {
-            self.ahead = publisher.loan_uninit().ok();
-        }
+        topic.restock();
     }
 }

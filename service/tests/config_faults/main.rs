@@ -143,7 +143,7 @@ fn each_fault_at_the_top_of_the_file() {
 
 #[test]
 fn each_fault_in_a_table() {
-    let cases: [(&str, &str, &[&str]); 33] = [
+    let cases: [(&str, &str, &[&str]); 38] = [
         (
             "[imu]\nmax_gap_s = 0",
             "imu.max_gap_s",
@@ -319,6 +319,12 @@ fn each_fault_in_a_table() {
             "[runtime]\nlock_memory = 1",
             "runtime.lock_memory",
             &["true or false"],
+        ),
+        ("[fleet]\nthreads = 0", "fleet.threads", &["1 to 256"]),
+        (
+            "[fleet]\ninstances = 'a,b,a'",
+            "fleet.instances",
+            &["names \"a\" twice"],
         ),
     ];
     for (tables, key, words) in cases {

@@ -11,7 +11,7 @@ use super::harness::{
 struct Sink(u64);
 
 impl<E> Outbox<E> for Sink {
-    fn publish(&mut self, _estimate: &E) {
+    fn publish(&mut self, _estimate: &mut E) {
         self.0 += 1;
     }
 }

@@ -8,6 +8,7 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 use inekf_bench::experiment::section7::{MismatchLaw, Setup};
 use inekf_bench::experiment::{self, Experiment, Prior};
+use inekf_bench::fleet::{self, FleetOptions};
 use inekf_bench::latency::mechanism::{self, Mechanism, Wait};
 use inekf_bench::latency::{LatencyOptions, figure, measure};
 use inekf_shared::topic::Instance;
@@ -34,6 +35,11 @@ enum Command {
         /// Draw the distributions as an SVG figure.
         #[arg(long, value_name = "FILE")]
         svg: Option<PathBuf>,
+    },
+    /// Many vehicles in one daemon, on one processor: how many samples come late?
+    Fleet {
+        #[command(flatten)]
+        options: FleetOptions,
     },
     /// An experiment of the papers: tables on standard output, CSV files and SVG figures in a folder.
     Experiment {
@@ -153,6 +159,11 @@ fn run(command: Command) -> anyhow::Result<()> {
             let mut stdout = std::io::stdout().lock();
             stdout.write_all(tables.as_bytes())?;
             writeln!(stdout, "\nwritten to {}", out.display())?;
+            Ok(())
+        }
+        Command::Fleet { options } => {
+            let report = fleet::measure(&options)?;
+            std::io::stdout().write_all(report.text().as_bytes())?;
             Ok(())
         }
         Command::Latency { options, json, svg } => {

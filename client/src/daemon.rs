@@ -19,6 +19,8 @@ const PROGRAM: &str = "inekf-service";
 pub const PROGRAM_VARIABLE: &str = "INEKF_SERVICE";
 /// How long the daemon may take to be ready.
 const READY_WITHIN: Duration = Duration::from_secs(10);
+/// And with many vehicles.
+const FLEET_READY_WITHIN: Duration = Duration::from_secs(300);
 /// How long it may take to stop before it is killed.
 const STOP_WITHIN: Duration = Duration::from_secs(5);
 
@@ -37,7 +39,15 @@ impl Daemon {
     /// The program is not found or stops before it is ready; what it wrote to standard error has
     /// gone to this process's.
     pub fn start(config: &Path, instance: &Instance) -> anyhow::Result<Self> {
-        Self::start_with(config, instance, &[])
+        Self::start_with(config, instance.as_str(), &[], READY_WITHIN)
+    }
+
+    /// The same for many vehicles, which `instances` names as on the daemon's command line. They take their time to open.
+    ///
+    /// # Errors
+    /// As [`Daemon::start`].
+    pub fn start_fleet(config: &Path, instances: &str) -> anyhow::Result<Self> {
+        Self::start_with(config, instances, &[], FLEET_READY_WITHIN)
     }
 
     /// The same for a daemon that takes its inputs from requests, one by one.
@@ -45,10 +55,15 @@ impl Daemon {
     /// # Errors
     /// As [`Daemon::start`].
     pub fn start_stepped(config: &Path, instance: &Instance) -> anyhow::Result<Self> {
-        Self::start_with(config, instance, &["--stepped"])
+        Self::start_with(config, instance.as_str(), &["--stepped"], READY_WITHIN)
     }
 
-    fn start_with(config: &Path, instance: &Instance, more: &[&str]) -> anyhow::Result<Self> {
+    fn start_with(
+        config: &Path,
+        instances: &str,
+        more: &[&str],
+        ready_within: Duration,
+    ) -> anyhow::Result<Self> {
         let program = program()?;
         let mut command = Command::new(&program);
         if std::env::var_os("RUST_LOG").is_none() {
@@ -58,7 +73,7 @@ impl Daemon {
         command
             .arg("--config")
             .arg(config)
-            .args(["--instance", instance.as_str()])
+            .args(["--instance", instances])
             .args(more)
             .stdin(Stdio::null())
             .stdout(Stdio::piped());
@@ -80,14 +95,14 @@ impl Daemon {
             child,
             ready_line: String::new(),
         };
-        match receiver.recv_timeout(READY_WITHIN) {
+        match receiver.recv_timeout(ready_within) {
             Ok(line) if line.starts_with("ready") => {
                 daemon.ready_line = line.trim_end().to_owned();
                 Ok(daemon)
             }
             Ok(line) => bail!("the daemon said {line:?} instead of being ready"),
             Err(mpsc::RecvTimeoutError::Timeout) => {
-                bail!("the daemon was not ready within {READY_WITHIN:?}")
+                bail!("the daemon was not ready within {ready_within:?}")
             }
             Err(mpsc::RecvTimeoutError::Disconnected) => {
                 let status = daemon.child.wait().context("waiting for the daemon")?;

@@ -98,12 +98,12 @@ fn doctor() -> anyhow::Result<()> {
             node.process, node.name, node.program
         );
     }
-    let (removed, kept) = inspect::remove_dead_nodes(&config)?;
-    println!("removed  {removed} dead nodes; {kept} could not be removed");
-    for file in inspect::half_made_services(&config)? {
-        std::fs::remove_file(&file).with_context(|| format!("removing {}", file.display()))?;
-        println!("removed  {}, left half made", file.display());
-    }
+    let swept = transport::sweep(&config)?;
+    println!(
+        "removed  {} dead nodes, {} services and {} files of theirs; {} nodes could not be removed",
+        swept.nodes, swept.services, swept.files, swept.kept
+    );
+    transport::remove_node_counter(&config);
     let files = inspect::shared_memory_files(&config)?;
     let bytes: u64 = files.iter().map(|(_, bytes)| bytes).sum();
     println!(
@@ -165,7 +165,8 @@ fn run<M: Model, H: History<M>>(
     instance: &Instance,
     stop: &AtomicBool,
 ) -> anyhow::Result<()> {
-    let mut ports = Ports::open(instance, config.runtime.wait, config.smoother.is_some())?;
+    let open = || Ports::open(instance, config.runtime.wait, config.smoother.is_some());
+    let mut ports = open()?;
     let mut out = std::io::stdout();
     writeln!(
         out,
@@ -176,7 +177,16 @@ fn run<M: Model, H: History<M>>(
     )
     .and_then(|()| out.flush())
     .context("writing the ready line")?;
-    daemon::run(&mut engine, &mut ports, config, stop)
+    while daemon::run(&mut engine, &mut ports, config, stop)? == daemon::Ended::FilesGone {
+        tracing::warn!(
+            "files of this instance in shared memory were removed while it ran; opening them anew. Feeders and \
+             readers have to be started again"
+        );
+        // Their places first, or the new ones would take them for another daemon's.
+        drop(ports);
+        ports = open()?;
+    }
+    Ok(())
 }
 
 /// Logs to standard error: information by default, iceoryx2 only when it warns.

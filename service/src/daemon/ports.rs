@@ -2,7 +2,6 @@
 
 use core::mem::MaybeUninit;
 
-use anyhow::Context;
 use iceoryx2::prelude::ipc;
 use iceoryx2::sample_mut_uninit::SampleMutUninit;
 use inekf_shared::clock::monotonic_ns;
@@ -13,53 +12,13 @@ use inekf_shared::message::{
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{
     self, ControlServer, InputMessage, LatestWriter, Node, PubSub, Publisher, Subscriber,
-    TransportError, WakeListener,
+    TransportError, WakeListener, Watched,
 };
 
+use super::fix_port::FixPort;
 use super::smoothed::SmoothedPort;
 use crate::config::WaitMode;
-use crate::engine::{MAX_AHEAD_NS, Model, Outbox};
-
-/// An aiding topic, read in step with the samples: a fix that is ahead of them is held back, and
-/// those behind it stay in the queue.
-#[derive(Debug)]
-pub struct FixPort<M: InputMessage> {
-    subscriber: Subscriber<M>,
-    held: Option<M>,
-}
-
-impl<M: InputMessage + Copy> FixPort<M> {
-    fn new(subscriber: Subscriber<M>) -> Self {
-        Self {
-            subscriber,
-            held: None,
-        }
-    }
-
-    /// The next fix with a stamp up to `horizon_ns`, or one so far ahead that its clock cannot be
-    /// right (the engine refuses it; holding it would block the topic).
-    ///
-    /// # Errors
-    /// The port failed.
-    pub fn next_until(&mut self, horizon_ns: u64) -> anyhow::Result<Option<M>> {
-        let next = match self.held.take() {
-            Some(held) => Some(held),
-            None => self
-                .subscriber
-                .receive()
-                .with_context(|| format!("receiving from {:?}", M::TOPIC))?
-                .map(|sample| *sample),
-        };
-        let ahead_ns = |fix: &M| fix.header().stamp_ns.saturating_sub(horizon_ns);
-        match next {
-            Some(fix) if (1..=MAX_AHEAD_NS).contains(&ahead_ns(&fix)) => {
-                self.held = Some(fix);
-                Ok(None)
-            }
-            next => Ok(next),
-        }
-    }
-}
+use crate::engine::{Model, Outbox};
 
 /// The input ports of a daemon whose motion samples are S.
 #[derive(Debug)]
@@ -185,6 +144,7 @@ pub struct Ports<M: Model> {
     pub control: ControlServer,
     /// Woken by feeders in event mode; without a listener their notifications cost nothing.
     pub wake: Option<WakeListener>,
+    watched: Watched,
     node: Node,
 }
 
@@ -217,7 +177,7 @@ impl<M: Model> Ports<M> {
             odometry2d: foreign::<M, _>(&inputs.odometry2d, INPUT_ODOMETRY_2D)?,
             odometry3d: foreign::<M, _>(&inputs.odometry3d, INPUT_ODOMETRY_3D)?,
         };
-        let ports = Self {
+        let mut ports = Self {
             inputs: Inputs {
                 samples: transport::input::<M::Sample>(&node, instance)?.subscriber()?,
                 position: FixPort::new(inputs.position.subscriber()?),
@@ -230,10 +190,17 @@ impl<M: Model> Ports<M> {
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,
+            watched: Watched::default(),
             node,
         };
         // Better an error now than a SIGBUS at some later send.
         transport::reserve_shared_memory(&ports.node)?;
+        ports.watched = Watched::of(&ports.node)?;
         Ok(ports)
+    }
+
+    /// Whether everything is still there that others need in order to attach.
+    pub fn are_intact(&self) -> bool {
+        self.watched.is_intact()
     }
 }

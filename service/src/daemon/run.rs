@@ -10,7 +10,9 @@ use core::time::Duration;
 
 use anyhow::Context;
 use inekf_shared::clock::monotonic_ns;
-use inekf_shared::message::{EstimateMessage, REASON_WRONG_MODEL};
+use inekf_shared::message::{
+    EstimateMessage, INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY, REASON_WRONG_MODEL,
+};
 use inekf_shared::transport::{InputMessage, WakeListener};
 
 use super::control::answer;
@@ -23,7 +25,17 @@ use crate::engine::{Engine, History, Model};
 /// Empty looks at the inputs between two looks at the clock in spin mode.
 const SPINS_PER_LOOK: u32 = 64;
 
-/// Runs until `stop` is set.
+/// Why the loop ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// It was asked to stop.
+    Stopped,
+    /// Somebody has removed files of the ports: what is attached goes on, but nobody can attach any more. The ports
+    /// have to be opened anew.
+    FilesGone,
+}
+
+/// Runs until `stop` is set, or until the ports have to be opened anew.
 ///
 /// # Errors
 /// A port that fails for good. What a sender wrote is never an error.
@@ -32,9 +44,10 @@ pub fn run<M: Model, H: History<M>>(
     ports: &mut Ports<M>,
     config: &Config,
     stop: &AtomicBool,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Ended> {
     let mut watch = Watch::new(
         monotonic_ns(),
+        engine.tally().received[M::INPUT],
         config.health.period_ns(),
         config.health.stale_after_ns(),
     );
@@ -48,12 +61,20 @@ pub fn run<M: Model, H: History<M>>(
         answer_requests(engine, ports)?;
         if watch.is_due(now_ns) {
             report(engine, ports, &mut watch, now_ns);
+            if !ports.are_intact() {
+                return Ok(Ended::FilesGone);
+            }
         }
         if samples == 0 {
             wait(ports.wake.as_ref(), bound)?;
         }
     }
-    Ok(())
+    // What waits for samples that will not come is counted too.
+    take_inputs(engine, ports)?;
+    take_fixes(engine, &mut ports.inputs, u64::MAX, &mut ports.estimates)?;
+    engine.finish(&mut ports.estimates);
+    report(engine, ports, &mut watch, monotonic_ns());
+    Ok(Ended::Stopped)
 }
 
 /// Takes everything that has arrived and is due. Returns the number of motion samples.
@@ -86,13 +107,22 @@ fn take_fixes<M: Model, H: History<M>>(
     horizon_ns: u64,
     outbox: &mut EstimatePort<M::Estimate>,
 ) -> anyhow::Result<()> {
-    while let Some(fix) = inputs.position.next_until(horizon_ns)? {
+    while let Some(fix) = inputs
+        .position
+        .next_until(horizon_ns, |header| engine.announce(INPUT_POSITION, header))?
+    {
         engine.position(&fix, outbox);
     }
-    while let Some(fix) = inputs.velocity.next_until(horizon_ns)? {
+    while let Some(fix) = inputs
+        .velocity
+        .next_until(horizon_ns, |header| engine.announce(INPUT_VELOCITY, header))?
+    {
         engine.velocity(&fix, outbox);
     }
-    while let Some(fix) = inputs.heading.next_until(horizon_ns)? {
+    while let Some(fix) = inputs
+        .heading
+        .next_until(horizon_ns, |header| engine.announce(INPUT_HEADING, header))?
+    {
         engine.heading(&fix, outbox);
     }
     Ok(())

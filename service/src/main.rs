@@ -103,12 +103,12 @@ fn doctor() -> anyhow::Result<()> {
             node.process, node.name, node.program
         );
     }
-    let (removed, kept) = inspect::remove_dead_nodes(&config)?;
-    println!("removed  {removed} dead nodes; {kept} could not be removed");
-    for file in inspect::half_made_services(&config)? {
-        std::fs::remove_file(&file).with_context(|| format!("removing {}", file.display()))?;
-        println!("removed  {}, left half made", file.display());
-    }
+    let swept = transport::sweep(&config)?;
+    println!(
+        "removed  {} dead nodes, {} services and {} files of theirs; {} nodes could not be removed",
+        swept.nodes, swept.services, swept.files, swept.kept
+    );
+    transport::remove_node_counter(&config);
     let files = inspect::shared_memory_files(&config)?;
     let bytes: u64 = files.iter().map(|(_, bytes)| bytes).sum();
     println!(

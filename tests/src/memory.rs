@@ -72,6 +72,12 @@ impl Memory {
             .collect()
     }
 
+    /// Paths of the files in `/dev/shm`.
+    pub fn shared_paths(&self) -> Vec<String> {
+        let path = |name: String| format!("{SHARED_MEMORY}/{name}");
+        self.shared_files().into_iter().map(path).collect()
+    }
+
     /// Paths of the files (not the folders) under the root.
     pub fn root_files(&self) -> Vec<String> {
         let mut files = Vec::new();

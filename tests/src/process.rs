@@ -194,6 +194,11 @@ impl Daemon {
         self.running.id()
     }
 
+    /// What it has written to standard error by now.
+    pub fn stderr(&self) -> String {
+        self.running.stderr()
+    }
+
     /// The line it wrote when it was ready.
     pub fn ready_line(&self) -> String {
         self.running

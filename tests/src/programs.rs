@@ -45,12 +45,17 @@ fn build() -> Programs {
     }
 }
 
-/// The folder of this program's profile: a test program is `PROFILE/deps/NAME`.
+/// The folder of this program's profile: a test program is `PROFILE/deps/NAME`, any other `PROFILE/NAME`.
 fn profile() -> String {
     let own = env::current_exe().expect("the test's own file");
-    let folder = own.ancestors().nth(2).and_then(|folder| folder.file_name());
-    let folder = folder.expect("the folder of a profile");
-    folder.to_string_lossy().into_owned()
+    let folders = own
+        .ancestors()
+        .skip(1)
+        .filter_map(|folder| folder.file_name());
+    let folder = folders
+        .map(|name| name.to_string_lossy())
+        .find(|name| name != "deps");
+    folder.expect("the folder of a profile").into_owned()
 }
 
 /// The file of the program `name`, out of cargo's messages: one JSON object a line.

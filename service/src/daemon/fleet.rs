@@ -15,7 +15,7 @@ use inekf_shared::transport::{self, Node};
 
 use super::ports::Ports;
 use super::realtime;
-use super::run::{Work, run};
+use super::run::{Ended, Work, run};
 use super::vehicle::{Terms, Vehicle};
 use crate::checkpoint::file::Identity;
 use crate::checkpoint::{self, Keeper};
@@ -108,23 +108,39 @@ fn thread<'a>(
     index: usize,
     ready: impl FnOnce() -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let mut vehicles = Vec::new();
-    for instance in instances {
+    let instances: Vec<&Instance> = instances.collect();
+    let mut vehicles = Vec::with_capacity(instances.len());
+    for instance in &instances {
         vehicles.push(open(order, instance)?);
     }
     realtime::apply(&order.config.runtime, index);
     ready()?;
-    let outcome = run(&mut vehicles, &order.config.runtime, order.stop);
+    let mut outcome = run(&mut vehicles, &order.config.runtime, order.stop);
+    while let Ok(Ended::FilesGone(index)) = outcome {
+        tracing::warn!(
+            instance = %instances[index],
+            "files of this instance in shared memory were removed while it ran; opening them anew. Feeders and \
+             readers have to be started again"
+        );
+        let reopened = vehicles.remove(index).reopen(node()?, instances[index])?;
+        vehicles.insert(index, reopened);
+        outcome = run(&mut vehicles, &order.config.runtime, order.stop);
+    }
+    let mut outcome = outcome.map(|_| ());
     for vehicle in vehicles {
-        vehicle.finish();
+        outcome = outcome.and(vehicle.finish());
     }
     outcome
 }
 
+fn node() -> anyhow::Result<Node> {
+    Ok(transport::open_node("inekf-service")?)
+}
+
 /// Opens one vehicle.
-fn open<'a>(order: &Order<'a>, instance: &Instance) -> anyhow::Result<Box<dyn Work + 'a>> {
+fn open<'a>(order: &Order<'a>, instance: &Instance) -> anyhow::Result<Box<dyn Work<'a> + 'a>> {
     let open = Open {
-        node: transport::open_node("inekf-service")?,
+        node: node()?,
         order,
         instance,
     };
@@ -138,7 +154,7 @@ struct Open<'o, 'a> {
 }
 
 impl<'a> Use for Open<'_, 'a> {
-    type Output = anyhow::Result<Box<dyn Work + 'a>>;
+    type Output = anyhow::Result<Box<dyn Work<'a> + 'a>>;
 
     fn with<M: Model + 'static, H: History<M> + 'static>(
         self,
@@ -151,6 +167,9 @@ impl<'a> Use for Open<'_, 'a> {
             ..
         } = *self.order;
         let mut ports = Ports::open_on(self.node, self.instance, config, stepped)?;
+        if self.order.instances.len() == 1 {
+            ports.watch_files()?;
+        }
         let mut terms = Terms {
             config,
             config_text,

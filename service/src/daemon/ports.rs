@@ -1,6 +1,5 @@
 //! Every shared-memory port of the daemon, opened before it says that it is ready.
 
-use anyhow::Context;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
     EstimateHead, EstimateMessage, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
@@ -9,76 +8,14 @@ use inekf_shared::message::{
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{
     self, ControlServer, InputMessage, LatestWriter, Node, Outlet, PubSub, Publisher, Subscriber,
-    TransportError, WakeListener,
+    TransportError, WakeListener, Watched,
 };
 
+use super::fix_port::FixPort;
 use super::journal::JournalPort;
 use super::smoothed::SmoothedPort;
 use crate::config::{Config, Motion, WaitMode};
-use crate::engine::{MAX_AHEAD_NS, Model, Outbox};
-
-/// An aiding topic, read in step with the samples: a fix that is ahead of them is held back, and
-/// those behind it stay in the queue.
-#[derive(Debug)]
-pub struct FixPort<M: InputMessage> {
-    subscriber: Subscriber<M>,
-    held: Option<M>,
-    is_used: bool,
-}
-
-impl<M: InputMessage + Copy> FixPort<M> {
-    fn new(subscriber: Subscriber<M>, is_used: bool) -> Self {
-        Self {
-            subscriber,
-            held: None,
-            is_used,
-        }
-    }
-
-    /// Whether a source is configured. What comes without one is refused, so no sample has to wait for a look at it.
-    pub fn is_used(&self) -> bool {
-        self.is_used
-    }
-
-    /// The next fix with a stamp up to `horizon_ns`, or one so far ahead that its clock cannot be
-    /// right (the engine refuses it; holding it would block the topic).
-    ///
-    /// # Errors
-    /// The port failed.
-    #[inline]
-    pub fn next_until(&mut self, horizon_ns: u64) -> anyhow::Result<Option<M>> {
-        // Nearly always there is nothing, and a sample waits for this answer.
-        if self.held.is_none() && !self.has_message()? {
-            return Ok(None);
-        }
-        self.take_until(horizon_ns)
-    }
-
-    fn has_message(&self) -> anyhow::Result<bool> {
-        let has = self.subscriber.has_samples();
-        has.with_context(|| format!("looking at {:?}", M::TOPIC))
-    }
-
-    #[inline(never)]
-    fn take_until(&mut self, horizon_ns: u64) -> anyhow::Result<Option<M>> {
-        let next = match self.held.take() {
-            Some(held) => Some(held),
-            None => self
-                .subscriber
-                .receive()
-                .with_context(|| format!("receiving from {:?}", M::TOPIC))?
-                .map(|sample| *sample),
-        };
-        let ahead_ns = |fix: &M| fix.header().stamp_ns.saturating_sub(horizon_ns);
-        match next {
-            Some(fix) if (1..=MAX_AHEAD_NS).contains(&ahead_ns(&fix)) => {
-                self.held = Some(fix);
-                Ok(None)
-            }
-            next => Ok(next),
-        }
-    }
-}
+use crate::engine::{Model, Outbox};
 
 /// The input ports of a daemon whose motion samples are S.
 #[derive(Debug)]
@@ -186,6 +123,7 @@ pub struct Ports<M: Model> {
     pub control: ControlServer,
     /// Woken by feeders in event mode; without a listener their notifications cost nothing.
     pub wake: Option<WakeListener>,
+    watched: Watched,
     node: Node,
 }
 
@@ -241,10 +179,26 @@ impl<M: Model> Ports<M> {
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,
+            watched: Watched::default(),
             node,
         };
         // Better an error now than a SIGBUS at some later send.
         transport::reserve_shared_memory(&ports.node)?;
         Ok(ports)
+    }
+
+    /// Has an eye on the files from now on, if this is the only vehicle of its process: those of several cannot be told
+    /// apart.
+    ///
+    /// # Errors
+    /// [`TransportError::Internal`] if the folders cannot be read.
+    pub fn watch_files(&mut self) -> Result<(), TransportError> {
+        self.watched = Watched::of(&self.node)?;
+        Ok(())
+    }
+
+    /// Whether everything is still there that others need in order to attach.
+    pub fn are_intact(&self) -> bool {
+        self.watched.is_intact()
     }
 }

@@ -3,21 +3,44 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::Node;
+
 use crate::config::{Runtime, WaitMode};
 
+/// What came of one look at a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// No sample waited.
+    Idle,
+    /// There was a sample.
+    Busy,
+    /// Files of its ports were removed: the ports have to be opened anew.
+    FilesGone,
+}
+
+/// Why a loop ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// It was asked to stop.
+    Stopped,
+    /// The ports of the vehicle with this index have to be opened anew.
+    FilesGone(usize),
+}
+
 /// One vehicle's work, as a loop sees it.
-pub trait Work {
+pub trait Work<'a> {
     /// Takes the samples that have come, then does one chore.
     ///
     /// # Errors
     /// A port that fails for good. What a sender wrote is never an error.
-    fn turn(&mut self) -> anyhow::Result<()>;
+    fn turn(&mut self) -> anyhow::Result<Turn>;
 
-    /// Takes the samples that have come, then does every chore. True if there was a sample.
+    /// Takes the samples that have come, then does every chore.
     ///
     /// # Errors
     /// As [`Work::turn`].
-    fn round(&mut self) -> anyhow::Result<bool>;
+    fn round(&mut self) -> anyhow::Result<Turn>;
 
     /// Sleeps until a sender wakes it, but never longer than `bound`.
     ///
@@ -25,37 +48,55 @@ pub trait Work {
     /// Waiting is not possible.
     fn sleep(&mut self, bound: Duration) -> anyhow::Result<()>;
 
-    /// Keeps what the next start needs.
-    fn finish(self: Box<Self>);
+    /// Opens its ports anew, on another node.
+    ///
+    /// # Errors
+    /// They cannot be opened.
+    fn reopen(
+        self: Box<Self>,
+        node: Node,
+        instance: &Instance,
+    ) -> anyhow::Result<Box<dyn Work<'a> + 'a>>;
+
+    /// Accounts for what has come and will not be used, says so, and keeps what the next start needs.
+    ///
+    /// # Errors
+    /// As [`Work::turn`].
+    fn finish(self: Box<Self>) -> anyhow::Result<()>;
 }
 
-/// Works until `stop` is set. Asleep between samples there can be one vehicle only: it is a loop's only reason to wake.
+/// Works until `stop` is set, or ports have to be opened anew. Asleep between samples there can be one vehicle only: it
+/// is a loop's only reason to wake.
 ///
 /// # Errors
 /// A port that fails for good. What a sender wrote is never an error.
-pub fn run<W: Work + ?Sized>(
+pub fn run<'a, W: Work<'a> + ?Sized>(
     vehicles: &mut [Box<W>],
     runtime: &Runtime,
     stop: &AtomicBool,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Ended> {
     match (runtime.wait, vehicles) {
         (WaitMode::Event, [vehicle]) => {
             let bound = runtime.event_timeout();
             while !stop.load(Ordering::Relaxed) {
-                // Every sleep is followed by a look at all inputs, so a lost wake-up costs at most the bound.
-                if !vehicle.round()? {
-                    vehicle.sleep(bound)?;
+                match vehicle.round()? {
+                    Turn::Busy => {}
+                    // Every sleep is followed by a look at all inputs, so a lost wake-up costs at most the bound.
+                    Turn::Idle => vehicle.sleep(bound)?,
+                    Turn::FilesGone => return Ok(Ended::FilesGone(0)),
                 }
             }
         }
         (_, vehicles) => {
             while !stop.load(Ordering::Relaxed) {
-                for vehicle in &mut *vehicles {
-                    vehicle.turn()?;
+                for (index, vehicle) in vehicles.iter_mut().enumerate() {
+                    if vehicle.turn()? == Turn::FilesGone {
+                        return Ok(Ended::FilesGone(index));
+                    }
                 }
                 core::hint::spin_loop();
             }
         }
     }
-    Ok(())
+    Ok(Ended::Stopped)
 }

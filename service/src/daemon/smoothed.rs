@@ -32,6 +32,14 @@ impl SmoothedPort {
         })
     }
 
+    /// A port without a topic, for a daemon that does not smooth: what is published there goes nowhere.
+    pub fn closed() -> Self {
+        Self {
+            publisher: None,
+            failures: 0,
+        }
+    }
+
     fn publish(&mut self, state: SmoothedState) {
         let Some(publisher) = &self.publisher else {
             return;

@@ -14,12 +14,13 @@ use inekf_shared::message::{
     EstimateMessage, HEALTH_NOT_RESUMED, HEALTH_RESUMED, INPUT_HEADING, INPUT_POSITION,
     INPUT_VELOCITY, Message, REASON_WRONG_MODEL,
 };
-use inekf_shared::transport::InputMessage;
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::{InputMessage, Node};
 
 use super::control::answer;
 use super::journal::JournalPort;
 use super::ports::{Ports, Refuser};
-use super::run::Work;
+use super::run::{Turn, Work};
 use super::watch::{Moment, Watch};
 use crate::checkpoint::Keeper;
 use crate::config::Config;
@@ -49,6 +50,18 @@ pub struct Vehicle<'a, M: Model, H> {
     watch: Watch,
     /// Chores done so far: whose turn it is.
     turns: usize,
+    /// Somebody has removed files of the ports: what is attached goes on, but nobody can attach any more.
+    are_files_gone: bool,
+}
+
+/// A watch that begins now.
+fn watch<M: Model, H: History<M>>(engine: &Engine<M, H>, config: &Config) -> Watch {
+    Watch::new(
+        monotonic_ns(),
+        engine.tally().received[M::INPUT],
+        config.health.period_ns(),
+        config.health.stale_after_ns(),
+    )
 }
 
 /// A topic of fixes.
@@ -89,14 +102,14 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
         terms: Terms<'a>,
         keeper: Option<Keeper>,
     ) -> Self {
-        let health = &terms.config.health;
         Self {
-            watch: Watch::new(monotonic_ns(), health.period_ns(), health.stale_after_ns()),
+            watch: watch(&engine, terms.config),
             engine,
             ports,
             terms,
             keeper,
             turns: 0,
+            are_files_gone: false,
         }
     }
 
@@ -161,19 +174,28 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
             (&mut ports.inputs, &mut ports.estimates, &mut ports.journal);
         match aid {
             Aid::Position => {
-                while let Some(fix) = inputs.position.next_until(horizon_ns)? {
+                while let Some(fix) = inputs
+                    .position
+                    .next_until(horizon_ns, |header| engine.announce(INPUT_POSITION, header))?
+                {
                     engine.position(&fix, outbox);
                     journal.input(engine.estimates(), INPUT_POSITION, fix.as_bytes());
                 }
             }
             Aid::Velocity => {
-                while let Some(fix) = inputs.velocity.next_until(horizon_ns)? {
+                while let Some(fix) = inputs
+                    .velocity
+                    .next_until(horizon_ns, |header| engine.announce(INPUT_VELOCITY, header))?
+                {
                     engine.velocity(&fix, outbox);
                     journal.input(engine.estimates(), INPUT_VELOCITY, fix.as_bytes());
                 }
             }
             Aid::Heading => {
-                while let Some(fix) = inputs.heading.next_until(horizon_ns)? {
+                while let Some(fix) = inputs
+                    .heading
+                    .next_until(horizon_ns, |header| engine.announce(INPUT_HEADING, header))?
+                {
                     engine.heading(&fix, outbox);
                     journal.input(engine.estimates(), INPUT_HEADING, fix.as_bytes());
                 }
@@ -230,6 +252,14 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
         Ok(())
     }
 
+    fn after(&self, any_sample: bool) -> Turn {
+        match (self.are_files_gone, any_sample) {
+            (true, _) => Turn::FilesGone,
+            (false, true) => Turn::Busy,
+            (false, false) => Turn::Idle,
+        }
+    }
+
     fn look_at_clock(&mut self) {
         let now_ns = monotonic_ns();
         if let Some(keeper) = &mut self.keeper {
@@ -237,6 +267,7 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
         }
         if self.watch.is_due(now_ns) {
             self.report(now_ns);
+            self.are_files_gone = !self.ports.are_intact();
         }
     }
 
@@ -274,21 +305,20 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
     }
 }
 
-impl<M: Model, H: History<M>> Work for Vehicle<'_, M, H> {
-    fn turn(&mut self) -> anyhow::Result<()> {
-        if !self.terms.stepped {
-            self.take_samples()?;
-        }
+impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M, H> {
+    fn turn(&mut self) -> anyhow::Result<Turn> {
+        let any = !self.terms.stepped && self.take_samples()?;
         self.turns = (self.turns + 1) % CHORES.len();
-        self.attend(CHORES[self.turns])
+        self.attend(CHORES[self.turns])?;
+        Ok(self.after(any))
     }
 
-    fn round(&mut self) -> anyhow::Result<bool> {
+    fn round(&mut self) -> anyhow::Result<Turn> {
         let any = !self.terms.stepped && self.take_samples()?;
         for chore in CHORES {
             self.attend(chore)?;
         }
-        Ok(any)
+        Ok(self.after(any))
     }
 
     fn sleep(&mut self, bound: Duration) -> anyhow::Result<()> {
@@ -298,10 +328,40 @@ impl<M: Model, H: History<M>> Work for Vehicle<'_, M, H> {
         Ok(())
     }
 
-    fn finish(self: Box<Self>) {
-        if let Some(keeper) = self.keeper {
-            keeper.finish(self.engine.snapshot());
+    fn reopen(
+        self: Box<Self>,
+        node: Node,
+        instance: &Instance,
+    ) -> anyhow::Result<Box<dyn Work<'a> + 'a>> {
+        let Self {
+            engine,
+            ports,
+            terms,
+            keeper,
+            ..
+        } = *self;
+        // Their places first, or the new ones would take them for another daemon's.
+        drop(ports);
+        let mut ports = Ports::open_on(node, instance, terms.config, terms.stepped)?;
+        ports.watch_files()?;
+        Ok(Box::new(Self::new(engine, ports, terms, keeper)))
+    }
+
+    fn finish(mut self: Box<Self>) -> anyhow::Result<()> {
+        let state = self.engine.snapshot();
+        if !self.terms.stepped {
+            // What waits for samples that will not come is counted too.
+            self.take_samples()?;
+            for aid in AIDS {
+                self.take(aid, u64::MAX)?;
+            }
+            self.engine.finish(&mut self.ports.estimates);
         }
+        self.report(monotonic_ns());
+        if let Some(keeper) = self.keeper {
+            keeper.finish(self.engine.snapshot().or(state));
+        }
+        Ok(())
     }
 }
 

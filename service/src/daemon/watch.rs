@@ -50,15 +50,15 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// A watch that starts at `now_ns` (CLOCK_MONOTONIC).
-    pub fn new(now_ns: u64, period_ns: u64, stale_after_ns: u64) -> Self {
+    /// A watch that starts at `now_ns` (CLOCK_MONOTONIC), when so many motion samples have arrived.
+    pub fn new(now_ns: u64, arrivals: u64, period_ns: u64, stale_after_ns: u64) -> Self {
         Self {
             started_ns: now_ns,
             period_ns,
             stale_after_ns,
             next_ns: now_ns,
             last_arrival_ns: now_ns,
-            arrivals_at_last: 0,
+            arrivals_at_last: arrivals,
             said: (0, 0),
             failures_said: 0,
             resumption_said: Resumption::None,

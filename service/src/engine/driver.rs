@@ -161,8 +161,8 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         outbox: &mut impl Outbox<M::Estimate>,
     ) {
         let header = sample.header();
-        let lost = self.output.tally.receive(M::INPUT, header);
-        self.missing = self.missing.saturating_add(lost);
+        let heard = self.output.tally.receive(M::INPUT, header);
+        self.missing = self.missing.saturating_add(heard.lost);
         if self.paused {
             self.missing = self.missing.saturating_add(1);
             return self.output.tally.refuse(Refusal(REASON_NOT_READY));
@@ -184,11 +184,8 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         let (input, continuity) = match checked {
             Ok(checked) => checked,
             Err(refusal) => {
-                // What it said is missing from now on, unless it only repeats what was heard before.
-                if self
-                    .last_input
-                    .is_some_and(|(last_ns, _)| stamp_ns > last_ns)
-                {
+                // What it said is missing from now on, whatever its stamp, unless it only repeats what was heard.
+                if self.last_input.is_some() && !heard.repeated {
                     self.missing = self.missing.saturating_add(1);
                 }
                 return self.output.tally.refuse(refusal);
@@ -246,6 +243,12 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         self.offer(self.model.heading(message), outbox);
     }
 
+    /// Notes that a fix of `input` has come and is kept elsewhere until its time: it is not lost. It is counted as
+    /// received when it is handed over.
+    pub fn announce(&mut self, input: usize, header: &Header) {
+        self.output.tally.announce(input, header);
+    }
+
     /// Counts a message of another model's topic as refused.
     pub fn refuse(&mut self, input: usize, header: &Header, refusal: Refusal) {
         self.output.tally.receive(input, header);
@@ -278,6 +281,21 @@ impl<M: Model, H: History<M>> Engine<M, H> {
             Some(0) => Err("there is no state yet: the daemon is not initialised"),
             Some(count) => Ok(count),
         }
+    }
+
+    /// Lets go of everything that still waits, because no sample will come any more: fixes without a partner as if
+    /// they had waited in vain, all others as not ready. After this every message that was received is accounted for.
+    pub fn finish(&mut self, outbox: &mut impl Outbox<M::Estimate>) {
+        self.settle(outbox);
+        self.unstack(u64::MAX, outbox);
+        let waiting = self.history.waiting()
+            + self.early.len() as u64
+            + u64::from(self.first_position.is_some());
+        self.output
+            .tally
+            .refuse_all(Refusal(REASON_NOT_READY), waiting);
+        self.early.clear();
+        self.first_position = None;
     }
 
     /// Forgets the state and initialises anew.

@@ -13,7 +13,7 @@ use iceoryx2::service::builder::request_response::{
     RequestResponseCreateError, RequestResponseOpenError, RequestResponseOpenOrCreateError,
 };
 
-use super::TransportError;
+use super::{Config, TransportError, sweep};
 
 /// How long a failure that may pass by itself is tried again. Races between processes that create, open and remove a
 /// service last milliseconds.
@@ -116,21 +116,63 @@ open_or_create_error!(
 );
 open_or_create_error!(EventOpenOrCreateError, EventOpenError, EventCreateError);
 
-/// Tries until it succeeds, fails for good, or a passing failure has lasted for [`RETRY_FOR`].
-pub(super) fn retry<T, E: Classify>(mut attempt: impl FnMut() -> Result<T, E>) -> Result<T, E> {
+/// A blackboard could be neither created nor opened.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum BlackboardError {
+    Create(BlackboardCreateError),
+    Open(BlackboardOpenError),
+}
+
+impl Classify for BlackboardError {
+    fn cause(self) -> Cause {
+        match self {
+            Self::Create(error) => error.cause(),
+            Self::Open(error) => error.cause(),
+        }
+    }
+}
+
+/// Tries until it succeeds, fails for good, or a passing failure has lasted for [`RETRY_FOR`]. If it then looks like
+/// what a killed process left, sweeps and tries as long once more.
+pub(super) fn retry<T, E: Classify>(
+    config: &Config,
+    mut attempt: impl FnMut() -> Result<T, E>,
+) -> Result<T, E> {
+    let outcome = try_for_a_while(&mut attempt);
+    match outcome {
+        Err(error) if error.cause().may_be_swept() => {
+            // If it cannot be swept, the second failure is the one to report.
+            let _ = sweep(config);
+            try_for_a_while(&mut attempt)
+        }
+        outcome => outcome,
+    }
+}
+
+fn try_for_a_while<T, E: Classify>(attempt: &mut impl FnMut() -> Result<T, E>) -> Result<T, E> {
     let started = Instant::now();
     loop {
         match attempt() {
-            Err(error)
-                if matches!(
-                    error.cause(),
-                    Cause::Race | Cause::Missing | Cause::Corrupted
-                ) && started.elapsed() < RETRY_FOR =>
-            {
+            Err(error) if error.cause().may_pass() && started.elapsed() < RETRY_FOR => {
                 sleep(RETRY_EVERY);
             }
             done => return done,
         }
+    }
+}
+
+impl Cause {
+    /// Whether it may pass by itself.
+    const fn may_pass(self) -> bool {
+        matches!(self, Self::Race | Self::Missing | Self::Corrupted)
+    }
+
+    /// Whether a process that was killed at the wrong moment may be behind it.
+    const fn may_be_swept(self) -> bool {
+        matches!(
+            self,
+            Self::Race | Self::Corrupted | Self::HalfCreated | Self::Internal
+        )
     }
 }
 

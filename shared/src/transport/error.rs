@@ -143,6 +143,18 @@ pub enum TransportError {
         free: u64,
     },
 
+    /// This process may open too few files.
+    #[error(
+        "this process may have {allowed} file descriptors, and needs {needed}; raise the limit (ulimit -n, or \
+         LimitNOFILE= of systemd)"
+    )]
+    Descriptors {
+        /// File descriptors that are needed.
+        needed: u64,
+        /// File descriptors that it may have.
+        allowed: u64,
+    },
+
     /// Shared memory cannot be backed ahead of time.
     #[error("the space of {path} could not be reserved ({cause}); does it belong to another user?")]
     Reserve {

@@ -1,10 +1,9 @@
-//! What lies in shared memory: nodes alive and dead, services left half made, files.
+//! What lies in shared memory: nodes alive and dead, files.
 //!
-//! For people and for cleaning up; no port is opened.
+//! For people and for cleaning up ([`super::sweep()`]); no port is opened.
 
 use std::fs;
 use std::io;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -14,11 +13,7 @@ use iceoryx2::prelude::{CallbackProgression, ipc};
 use super::{Config, TransportError};
 
 /// Where the system keeps shared memory.
-const SHARED_MEMORY: &str = "/dev/shm";
-/// Permissions of a service's description while it is being written; it is finished read-only.
-const BEING_WRITTEN: u32 = 0o600;
-/// A description is written within milliseconds: one that is older was left by a process that died.
-const ABANDONED_AFTER: Duration = Duration::from_secs(2);
+pub(super) const SHARED_MEMORY: &str = "/dev/shm";
 /// How long the clean-up of one dead node may take.
 const CLEANUP_WITHIN: Duration = Duration::from_secs(5);
 
@@ -83,6 +78,32 @@ pub fn nodes(config: &Config) -> Result<Vec<NodeReport>, TransportError> {
     Ok(reports)
 }
 
+/// A node, as a sweep needs it.
+pub(super) struct NodeId {
+    pub(super) id: u128,
+    /// Whether its process is alive, or may be: a node of another user tells nothing.
+    pub(super) alive: bool,
+    pub(super) has_details: bool,
+}
+
+/// The ids of all nodes under `config`.
+pub(super) fn node_ids(config: &Config) -> Result<Vec<NodeId>, TransportError> {
+    let mut ids = Vec::new();
+    each_node(config, |state| {
+        let (alive, has_details) = match &state {
+            NodeState::Dead(view) => (false, view.details().is_some()),
+            _ => (true, true),
+        };
+        let id = state.node_id().value();
+        ids.push(NodeId {
+            id,
+            alive,
+            has_details,
+        });
+    })?;
+    Ok(ids)
+}
+
 /// Removes what dead nodes left. Returns how many were removed and how many could not be.
 ///
 /// # Errors
@@ -98,23 +119,6 @@ pub fn remove_dead_nodes(config: &Config) -> Result<(usize, usize), TransportErr
         }
     })?;
     Ok((removed, kept))
-}
-
-/// Descriptions of services that a process began to write and died over. iceoryx2 neither finishes
-/// nor removes them, and their services cannot be opened until they are gone.
-///
-/// # Errors
-/// The folder of services cannot be read.
-pub fn half_made_services(config: &Config) -> io::Result<Vec<PathBuf>> {
-    let folder = PathBuf::from(config.global.service_dir().to_string());
-    let mut found = Vec::new();
-    for (path, metadata) in files(&folder, &config.global.prefix.to_string())? {
-        let age = metadata.modified()?.elapsed().unwrap_or_default();
-        if metadata.permissions().mode() & 0o777 == BEING_WRITTEN && age > ABANDONED_AFTER {
-            found.push(path);
-        }
-    }
-    Ok(found)
 }
 
 /// The files in shared memory under `config`, with their sizes in bytes.

@@ -105,12 +105,14 @@ mod open;
 mod outlet;
 mod reserve;
 mod service;
+mod sweep;
+mod watched;
 
 pub use error::TransportError;
 pub use iceoryx2::config::Config;
 pub use node::{
     IPC_PREFIX_VARIABLE, IPC_ROOT_AND_PREFIX_MAX_LEN, IPC_ROOT_VARIABLE, Node, config,
-    config_from_env, open_node, open_node_with,
+    config_from_env, open_node, open_node_with, remove_node_counter,
 };
 pub use open::{
     InputMessage, Inputs, control, estimate, estimate_model, health, input, inputs, journal,
@@ -122,3 +124,5 @@ pub use service::{
     Control, ControlClient, ControlServer, Latest, LatestReader, LatestWriter, PubSub, Publisher,
     Received, Subscriber, Wake, WakeListener, WakeNotifier,
 };
+pub use sweep::{Swept, process_of, sweep};
+pub use watched::Watched;

@@ -9,7 +9,8 @@ use iceoryx2::prelude::{
     ipc,
 };
 
-use super::TransportError;
+use super::reserve::{LEAST_FREE, require_descriptors, require_shared_memory};
+use super::{TransportError, sweep};
 
 type IpcNode = iceoryx2::node::Node<ipc::Service>;
 
@@ -54,6 +55,11 @@ impl Drop for NodeCounter {
                 unsafe { iceoryx2::testing::remove_global_mgmt_segment::<ipc::Service>(&self.0) };
         }
     }
+}
+
+/// Removes iceoryx2's count of nodes if there is no node, for a process that cleans up and has none of its own.
+pub fn remove_node_counter(config: &Config) {
+    drop(NodeCounter(config.clone()));
 }
 
 /// Environment variable: absolute directory of the files that describe nodes and services.
@@ -136,10 +142,12 @@ pub fn open_node(name: &str) -> Result<Node, TransportError> {
 
 /// Creates a node under `config`.
 ///
-/// Signals are left alone: iceoryx2 would otherwise take over SIGINT and SIGTERM at the first wait.
+/// Signals are left alone: iceoryx2 would otherwise take over SIGINT and SIGTERM at the first wait. What killed
+/// processes left is swept away first.
 ///
 /// # Errors
-/// [`TransportError::Node`].
+/// [`TransportError::Node`]; [`TransportError::Space`] or [`TransportError::Descriptors`] if there is too little of
+/// either for anything to be opened.
 pub fn open_node_with(name: &str, config: &Config) -> Result<Node, TransportError> {
     let refuse = |cause: String| TransportError::Node {
         node: name.to_owned(),
@@ -147,6 +155,10 @@ pub fn open_node_with(name: &str, config: &Config) -> Result<Node, TransportErro
         cause,
     };
     let node_name = NodeName::new(name).map_err(|error| refuse(format!("{error:?}")))?;
+    require_descriptors()?;
+    require_shared_memory(LEAST_FREE)?;
+    // What could not be swept need not stand in the way; if it does, whatever it blocks says so.
+    let _ = sweep(config);
     let node = NodeBuilder::new()
         .name(&node_name)
         .config(config)

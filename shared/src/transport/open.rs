@@ -4,11 +4,12 @@
 //! order. The newest estimate is created by the daemon alone.
 
 use iceoryx2::prelude::{MessagingPattern, Service, ServiceName, ipc};
-use iceoryx2::service::builder::blackboard::BlackboardCreateError;
+use iceoryx2::service::builder::blackboard::{BlackboardCreateError, BlackboardOpenError};
+use iceoryx2::service::port_factory::blackboard;
 use iceoryx2::service::static_config::message_type_details::TypeDetail;
 use iceoryx2::service::static_config::messaging_pattern::MessagingPattern as StaticPattern;
 
-use super::classify::{Classify, explain, retry};
+use super::classify::{BlackboardError, Classify, explain, retry};
 use super::service::{Control, Latest, PubSub, Wake};
 use super::{Node, TransportError};
 use crate::message::{
@@ -193,7 +194,7 @@ fn pub_sub<M: Message>(
             .enable_safe_overflow(true)
             .open_or_create()
     };
-    let factory = retry(open).map_err(|error| {
+    let factory = retry(node.config(), open).map_err(|error| {
         refuse(
             node,
             error,
@@ -202,7 +203,7 @@ fn pub_sub<M: Message>(
             || describe::<M>(),
         )
     })?;
-    Ok(PubSub::new(service, qos, factory))
+    Ok(PubSub::new(service, qos, node.config().clone(), factory))
 }
 
 /// Opens the control of an instance.
@@ -229,7 +230,7 @@ pub fn control(node: &Node, instance: &Instance) -> Result<Control, TransportErr
             .enable_fire_and_forget_requests(true)
             .open_or_create()
     };
-    let factory = retry(open).map_err(|error| {
+    let factory = retry(node.config(), open).map_err(|error| {
         refuse(
             node,
             error,
@@ -267,7 +268,7 @@ pub fn wake(node: &Node, instance: &Instance) -> Result<Wake, TransportError> {
             .disable_notifier_dead_event()
             .open_or_create()
     };
-    let factory = retry(open)
+    let factory = retry(node.config(), open)
         .map_err(|error| refuse(node, error, &name, MessagingPattern::Event, String::new))?;
     Ok(Wake::new(service, factory))
 }
@@ -293,18 +294,29 @@ pub fn latest<E: EstimateMessage>(
             .max_nodes(qos::MAX_NODES)
             .create()
     };
-    match create() {
-        Ok(factory) => Ok(Latest::new(service, factory)),
-        Err(BlackboardCreateError::AlreadyExists) => open_latest(node, instance),
-        Err(_) => {
-            let factory = retry(create).map_err(|error| {
-                refuse(node, error, &name, MessagingPattern::Blackboard, || {
-                    describe::<E>()
-                })
-            })?;
-            Ok(Latest::new(service, factory))
-        }
-    }
+    let open = || open_blackboard(node, &name);
+    // Whoever keeps it from an earlier daemon may leave between the two attempts.
+    let attempt = || match create() {
+        Err(BlackboardCreateError::AlreadyExists) => open().map_err(BlackboardError::Open),
+        created => created.map_err(BlackboardError::Create),
+    };
+    let factory = retry(node.config(), attempt).map_err(|error| {
+        refuse(node, error, &name, MessagingPattern::Blackboard, || {
+            describe::<E>()
+        })
+    })?;
+    Ok(Latest::new(service, factory))
+}
+
+fn open_blackboard(
+    node: &Node,
+    name: &ServiceName,
+) -> Result<blackboard::PortFactory<ipc::Service, u32>, BlackboardOpenError> {
+    node.service_builder(name)
+        .blackboard_opener::<u32>()
+        .max_readers(qos::LATEST_READERS)
+        .max_nodes(qos::MAX_NODES)
+        .open()
 }
 
 /// Opens the newest estimate of an instance, for readers.
@@ -317,14 +329,8 @@ pub fn open_latest<E: EstimateMessage>(
 ) -> Result<Latest<E>, TransportError> {
     let service = Topic::Latest.service_name(instance);
     let name = service_name(&service)?;
-    let open = || {
-        node.service_builder(&name)
-            .blackboard_opener::<u32>()
-            .max_readers(qos::LATEST_READERS)
-            .max_nodes(qos::MAX_NODES)
-            .open()
-    };
-    let factory = retry(open).map_err(|error| {
+    let open = || open_blackboard(node, &name);
+    let factory = retry(node.config(), open).map_err(|error| {
         refuse(node, error, &name, MessagingPattern::Blackboard, || {
             describe::<E>()
         })

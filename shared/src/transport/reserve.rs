@@ -10,11 +10,10 @@ use std::io;
 use std::path::Path;
 
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
-use super::{Node, TransportError};
-
-/// Where POSIX shared memory lies on Linux.
-const SHARED_MEMORY: &str = "/dev/shm";
+use super::inspect::SHARED_MEMORY;
+use super::{Config, Node, TransportError};
 
 /// Backs all shared memory of iceoryx2 that this process has mapped by now, and returns its size in bytes. Call it when
 /// all ports are made. Connections to ports that come later are not covered; they are small.
@@ -32,6 +31,59 @@ pub fn reserve_shared_memory(node: &Node) -> Result<u64, TransportError> {
         total += reserve(&path)?;
     }
     Ok(total)
+}
+
+/// Shared memory that must be free for anything to be opened, bytes: descriptions, connections and events are small.
+pub(super) const LEAST_FREE: u64 = 1 << 20;
+/// File descriptors that a process needs at least: a daemon has 53 open, and some for every party.
+const LEAST_DESCRIPTORS: u64 = 128;
+
+/// Whether this process may open enough files; raises its limit where it can.
+///
+/// # Errors
+/// [`TransportError::Descriptors`].
+pub(super) fn require_descriptors() -> Result<(), TransportError> {
+    let limit = getrlimit(Resource::Nofile);
+    if limit.current.is_none_or(|now| now >= LEAST_DESCRIPTORS) {
+        return Ok(());
+    }
+    let raised = Rlimit {
+        current: Some(LEAST_DESCRIPTORS),
+        ..limit
+    };
+    setrlimit(Resource::Nofile, raised).map_err(|_| TransportError::Descriptors {
+        needed: LEAST_DESCRIPTORS,
+        allowed: limit.current.unwrap_or(0),
+    })
+}
+
+/// Backs the data segment of the port `id` as a whole.
+pub(super) fn reserve_segment_of(config: &Config, id: u128) -> Result<(), TransportError> {
+    let prefix = config.global.prefix.to_string();
+    let end = format!("{id}{}", config.global.service.data_segment_suffix);
+    let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
+        return Ok(());
+    };
+    for entry in entries.filter_map(Result::ok) {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with(&prefix) && name.ends_with(&end) {
+            reserve(&entry.path().display().to_string())?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether so many bytes of shared memory are free. Asked before the first segment is made: iceoryx2 writes to a new
+/// segment at once, and would be killed by SIGBUS in the middle of it.
+///
+/// # Errors
+/// [`TransportError::Space`].
+pub(super) fn require_shared_memory(needed: u64) -> Result<(), TransportError> {
+    let free = free_shared_memory();
+    if free < needed {
+        return Err(TransportError::Space { needed, free });
+    }
+    Ok(())
 }
 
 /// Paths of the files in `/dev/shm` whose names start with `prefix`, out of the text of `/proc/self/maps`, each once.

@@ -18,7 +18,8 @@ use iceoryx2::service::port_factory::client::ClientCreateError;
 use iceoryx2::service::port_factory::server::ServerCreateError;
 use iceoryx2::service::port_factory::{blackboard, event, publish_subscribe, request_response};
 
-use super::TransportError;
+use super::reserve::{LEAST_FREE, require_shared_memory, reserve_segment_of};
+use super::{Config, TransportError};
 use crate::message::{ControlRequest, ControlResponse, EstimateMessage, Message};
 use crate::qos::{self, PubSubQos};
 
@@ -35,11 +36,15 @@ pub type ControlClient = Client<ipc::Service, ControlRequest, (), ControlRespons
 /// Wakes.
 pub type WakeNotifier = Notifier<ipc::Service>;
 
+/// Bytes that iceoryx2 adds to each message, with its share of the list of free slots; a little more than measured.
+const SLOT_HEADER: usize = 64;
+
 /// An open publish-subscribe topic.
 #[derive(Debug)]
 pub struct PubSub<M: Message> {
     service: String,
     qos: PubSubQos,
+    config: Config,
     factory: publish_subscribe::PortFactory<ipc::Service, M, ()>,
 }
 
@@ -47,20 +52,25 @@ impl<M: Message> PubSub<M> {
     pub(super) fn new(
         service: String,
         qos: PubSubQos,
+        config: Config,
         factory: publish_subscribe::PortFactory<ipc::Service, M, ()>,
     ) -> Self {
         Self {
             service,
             qos,
+            config,
             factory,
         }
     }
 
-    /// Makes a publisher. Its `send` never waits for a subscriber.
+    /// Makes a publisher. Its `send` never waits for a subscriber, and finds its memory backed.
     ///
     /// # Errors
-    /// [`TransportError::Full`] if there are as many as there may be, [`TransportError::Internal`] otherwise.
+    /// [`TransportError::Full`] if there are as many as there may be, [`TransportError::Space`] if there is too little
+    /// shared memory, [`TransportError::Internal`] otherwise.
     pub fn publisher(&self) -> Result<Publisher<M>, TransportError> {
+        // Before it is made, because iceoryx2 writes to the new segment at once, and would be killed by SIGBUS.
+        require_shared_memory(self.segment_bytes() + LEAST_FREE)?;
         let create = || {
             self.factory
                 .publisher_builder()
@@ -74,14 +84,24 @@ impl<M: Message> PubSub<M> {
             limit: self.qos.publishers,
             full: PublisherCreateError::ExceedsMaxSupportedPublishers,
         };
-        port.make(&self.factory, create, || {
+        let publisher = port.make(&self.factory, create, || {
             let mut nodes = Vec::new();
             self.factory.dynamic_config().list_publishers(|details| {
                 nodes.push(details.node_id);
                 CallbackProgression::Continue
             });
             nodes
-        })
+        })?;
+        reserve_segment_of(&self.config, publisher.id().value())?;
+        Ok(publisher)
+    }
+
+    /// Size of a publisher's segment: a slot for every message that subscribers may have waiting or in hand, and for
+    /// those on loan.
+    fn segment_bytes(&self) -> u64 {
+        let of_subscribers = self.qos.subscribers * (self.qos.buffer + qos::MAX_BORROWED);
+        let slots = of_subscribers + self.qos.history + qos::MAX_LOANED + 1;
+        (slots * (size_of::<M>() + SLOT_HEADER)) as u64
     }
 
     /// Makes a subscriber with the topic's whole buffer. It gets what is sent from now on, and the topic's history.

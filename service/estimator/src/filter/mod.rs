@@ -34,6 +34,7 @@ pub mod componentwise;
 pub mod constrained;
 pub mod constraint;
 pub mod covariance;
+pub mod definite;
 pub mod factor;
 pub mod gain;
 pub mod gate;

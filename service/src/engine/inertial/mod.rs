@@ -1,6 +1,8 @@
 //! The model `imu`: an IMU moves SE_2(3), with biases or without; position, velocity and heading correct it.
 
-use inekf::filter::{Alignment, Belief, InertialSide, Levelled, UpdateError, propagate_in_place};
+use inekf::filter::{
+    Alignment, Belief, InertialSide, Levelled, UpdateError, Verdict, propagate_in_place,
+};
 use inekf::lie::SO3;
 use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState};
 use inekf::smoother::Preintegration;
@@ -246,7 +248,12 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
         gated: bool,
     ) -> Result<Fused, UpdateError> {
         let options = self.fusion.options(gated);
-        fix.measurement.fuse(belief, &options)
+        let fused = fix.measurement.fuse(belief, &options)?;
+        // Chosen by the fix's own number, so that a replay does the same.
+        if fused.verdict == Verdict::Accepted && fix.seq.is_multiple_of(MENDED_EVERY) {
+            belief.covariance = belief.covariance.made_definite();
+        }
+        Ok(fused)
     }
 
     fn widening(&self, belief: &Belief<G, S, D>, fix: &Fix<Aiding>, nis: f64) -> Widening {
@@ -298,6 +305,9 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
     }
 }
 
+/// Every so many fixes of a sender the covariance is looked at, and mended if rounding has made it indefinite: far more
+/// often than it takes for that, and too seldom to be noticed in the time of an update.
+const MENDED_EVERY: u64 = 16;
 /// Beyond this, m, an estimate is not of this world: the filter has diverged.
 const MAX_POSITION_M: f64 = 1e10;
 /// Likewise, m/s.

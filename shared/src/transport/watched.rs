@@ -1,0 +1,81 @@
+//! Whether others can still attach to what this process has open.
+//!
+//! Shared memory stays usable for those who have it mapped after its file was removed; nothing fails, but nobody new
+//! finds it. A long-lived process looks now and then whether its files are still there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::inspect::SHARED_MEMORY;
+use super::sweep::{ids, process_of, service_id};
+use super::{Node, TransportError};
+
+/// The files without which nobody can attach: the node's own, the services' that it has open, and its ports' data.
+#[derive(Clone, Debug, Default)]
+pub struct Watched(Vec<PathBuf>);
+
+impl Watched {
+    /// Those of a node whose ports are all made. Assumes that no other node of this process uses the same prefix.
+    ///
+    /// # Errors
+    /// [`TransportError::Internal`] if the folders cannot be read.
+    pub fn of(node: &Node) -> Result<Self, TransportError> {
+        let global = &node.config().global;
+        let own = node.id().value();
+        let prefix = global.prefix.to_string();
+        let nodes = PathBuf::from(global.node_dir().to_string());
+        let services = PathBuf::from(global.service_dir().to_string());
+
+        let mut files = vec![nodes.join(format!("{prefix}{own}{}", global.node.monitor_suffix))];
+        let tag_suffix = global.node.service_tag_suffix.to_string();
+        let mut used = Vec::new();
+        for tag in names(&nodes.join(own.to_string()))? {
+            let Some(service) = tag
+                .strip_suffix(&tag_suffix)
+                .filter(|name| name.starts_with(&prefix))
+            else {
+                continue;
+            };
+            let description = services.join(format!(
+                "{service}{}",
+                global.service.static_config_storage_suffix
+            ));
+            let text = fs::read_to_string(&description).ok();
+            used.extend(text.and_then(|text| service_id(&text)));
+            files.push(description);
+        }
+        let data_suffix = global.service.data_segment_suffix.to_string();
+        let shared_suffix = global.service.dynamic_config_storage_suffix.to_string();
+        let is_needed = |name: &String| {
+            let ids = name.strip_prefix(&prefix).map(ids).unwrap_or_default();
+            let [id] = ids[..] else { return false };
+            (name.ends_with(&data_suffix) && process_of(id) == std::process::id())
+                || (name.ends_with(&shared_suffix) && used.contains(&id))
+        };
+        let segments = names(Path::new(SHARED_MEMORY))?.into_iter();
+        files.extend(
+            segments
+                .filter(is_needed)
+                .map(|name| Path::new(SHARED_MEMORY).join(name)),
+        );
+        files.retain(|file| file.exists());
+        Ok(Self(files))
+    }
+
+    /// Whether all of them are still there. One system call for each.
+    #[must_use]
+    pub fn is_intact(&self) -> bool {
+        self.0.iter().all(|file| file.exists())
+    }
+}
+
+fn names(folder: &Path) -> Result<Vec<String>, TransportError> {
+    let entries = fs::read_dir(folder).map_err(|error| TransportError::Internal {
+        service: folder.display().to_string(),
+        cause: error.to_string(),
+    })?;
+    Ok(entries
+        .filter_map(Result::ok)
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect())
+}

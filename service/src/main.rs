@@ -10,7 +10,7 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 use inekf::filter::UpdateError;
 use inekf_service::config::Config;
-use inekf_service::daemon::{self, Ports};
+use inekf_service::daemon::{self, Ports, supervisor};
 use inekf_service::engine::{self, Engine, History, Model, Use};
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, inspect};
@@ -176,16 +176,24 @@ fn run<M: Model, H: History<M>>(
     )
     .and_then(|()| out.flush())
     .context("writing the ready line")?;
-    daemon::run(&mut engine, &mut ports, config, stop)
+    supervisor::ready();
+    let outcome = daemon::run(&mut engine, &mut ports, config, stop);
+    supervisor::stopping();
+    outcome
 }
 
-/// Logs to standard error: information by default, iceoryx2 only when it warns.
+/// Logs to standard error: information by default, iceoryx2 only when it warns. Where that is the journal, which keeps
+/// the time itself, lines have none.
 fn start_logging() {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info,iceoryx2=error"));
-    tracing_subscriber::fmt()
+    let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .init();
+        .with_ansi(std::io::stderr().is_terminal());
+    if std::env::var_os("JOURNAL_STREAM").is_some() {
+        log.without_time().init();
+    } else {
+        log.init();
+    }
 }

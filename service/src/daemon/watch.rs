@@ -7,6 +7,7 @@ use inekf_shared::message::{
 };
 use tracing::{info, warn};
 
+use super::supervisor;
 use crate::engine::tally::Tally;
 
 /// What the loop knows at one moment.
@@ -75,6 +76,7 @@ impl Watch {
             state = STATE_STALE;
         }
         self.log((state, waiting_for), moment.failures, tally);
+        supervisor::alive(state_name(state));
         Health {
             stamp_ns: moment.now_ns,
             uptime_ns: moment.now_ns - self.started_ns,

@@ -48,11 +48,32 @@ pub use health::{
     WAITING_FOR_REQUEST, input_name, reason_name, state_name, waiting_for_name,
 };
 pub use imu::ImuSample;
-pub use layout::{Message, Zero};
+pub use layout::{Field, FieldType, Layout, Message, Zero};
 pub use odometry::{Odometry2d, Odometry3d};
 pub use position::PositionFix;
 pub use smoothed::{SMOOTHED_CUT, SMOOTHED_FLAGS, SmoothedState};
 pub use velocity::VelocityFix;
+
+/// Every struct of the contract, each after those that it holds.
+pub const LAYOUTS: [&Layout; 17] = [
+    &Header::WIRE,
+    &ImuSample::WIRE,
+    &Odometry2d::WIRE,
+    &Odometry3d::WIRE,
+    &PositionFix::WIRE,
+    &VelocityFix::WIRE,
+    &HeadingFix::WIRE,
+    &Counters::WIRE,
+    &EstimateHead::WIRE,
+    &EstimateSe23::WIRE,
+    &EstimateSe3::WIRE,
+    &EstimateSe2::WIRE,
+    &SmoothedState::WIRE,
+    &Health::WIRE,
+    &StateVector::WIRE,
+    &ControlRequest::WIRE,
+    &ControlResponse::WIRE,
+];
 
 /// How many sources of position an estimate reports on: source ids are `0..MAX_SOURCES`.
 pub const MAX_SOURCES: usize = 8;

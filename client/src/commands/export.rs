@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use inekf_client::dataset::read_truth;
-use inekf_client::exchange::{flat, truth_table, tum};
+use inekf_client::exchange::{flat, require_sorted, truth_table, tum};
 use inekf_client::table::{EstimateTable, read_estimates};
 
 /// What to export, and how.
@@ -40,7 +40,14 @@ enum Format {
 /// The input cannot be read or has faults, its stamps do not increase, or the output cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let table = read(&arguments.input)?;
+    require_sorted(&table.rows).with_context(|| arguments.input.display().to_string())?;
     let path = &arguments.out;
+    if same_file(&arguments.input, path) {
+        bail!(
+            "{} would be overwritten: name another --out",
+            path.display()
+        );
+    }
     let file = File::create(path).with_context(|| format!("creating {}", path.display()))?;
     let mut out = BufWriter::new(file);
     let written = match arguments.format {
@@ -63,6 +70,10 @@ fn write_mcap(table: &EstimateTable, out: &mut BufWriter<File>) -> anyhow::Resul
 #[cfg(not(feature = "mcap"))]
 fn write_mcap(_table: &EstimateTable, _out: &mut BufWriter<File>) -> anyhow::Result<()> {
     bail!("this program was built without MCAP: build it with the feature `mcap`")
+}
+
+fn same_file(one: &Path, other: &Path) -> bool {
+    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
 /// Reads an estimate CSV, or a truth, which has no biases in its header.

@@ -2,6 +2,9 @@
 
 mod dataset;
 mod evaluate;
+mod exchange;
+mod geodetic;
+mod look;
 mod meta;
 mod models;
 mod planar;

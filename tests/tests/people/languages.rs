@@ -159,9 +159,14 @@ fn the_rust_example_feeds_and_reads() {
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
         .find_map(|message| message["executable"].as_str().map(OsString::from))
         .expect("the example's file");
-    let ended = run(&memory, &program, &["car"], &examples()).wait().succeeded();
+    let ended = run(&memory, &program, &["car"], &examples())
+        .wait()
+        .succeeded();
     assert!(ended.stdout.starts_with("400 samples heard"), "{ended:#?}");
-    assert!(ended.stdout.contains("now at 1.00 2.00 3.00 m"), "{ended:#?}");
+    assert!(
+        ended.stdout.contains("now at 1.00 2.00 3.00 m"),
+        "{ended:#?}"
+    );
     daemon.stop();
 }
 

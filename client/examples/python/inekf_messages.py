@@ -518,3 +518,6 @@ for _message in MESSAGES:
     assert ctypes.sizeof(_message) == _message.SIZE, _message
     assert ctypes.alignment(_message) == _message.ALIGN, _message
     assert _fields == _message.OFFSETS, _message
+    # Without a hole: a field of another size would leave one.
+    _sizes = [ctypes.sizeof(held) for _, held in _message._fields_]
+    assert sum(_sizes) == _message.SIZE, _message

@@ -64,6 +64,11 @@ impl Dataset {
 
         let mut meta = folder.meta()?;
         let mut frame = geodetic::frame_of(&meta, &mut folder.faults);
+        // In the order in which faults are listed.
+        let imu = folder.table("imu.csv", IMU, read_imu)?.unwrap_or_default();
+        let odometry = folder
+            .table("odometry.csv", ODOMETRY_2D, read_odometry)?
+            .unwrap_or_default();
         let position = folder
             .table(&options.position_file, POSITION, |table, faults| {
                 if table.has("lat") {
@@ -78,10 +83,8 @@ impl Dataset {
         }
         let mut dataset = Self {
             meta,
-            imu: folder.table("imu.csv", IMU, read_imu)?.unwrap_or_default(),
-            odometry: folder
-                .table("odometry.csv", ODOMETRY_2D, read_odometry)?
-                .unwrap_or_default(),
+            imu,
+            odometry,
             position,
             velocity: folder
                 .table("velocity.csv", VELOCITY, read_velocity)?

@@ -15,6 +15,7 @@ use inekf_tests::folder::Folder;
 use inekf_tests::link::{Link, instance};
 use inekf_tests::memory::Memory;
 use inekf_tests::process::{Daemon, Ended, Running, client, eventually};
+use inekf_tests::programs::example;
 use inekf_tests::tools;
 
 const CONFIG: &str = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
@@ -145,20 +146,7 @@ fn assert_reads(ended: &Ended) {
 fn the_rust_example_feeds_and_reads() {
     let memory = Memory::new();
     let daemon = Daemon::start(&memory, "car", CONFIG);
-    let mut build = Command::new(env!("CARGO"));
-    build.current_dir(env!("CARGO_MANIFEST_DIR")).args([
-        "build",
-        "--quiet",
-        "--package=inekf-client",
-        "--example=in_process",
-        "--message-format=json",
-    ]);
-    let messages = Running::start(build).wait().succeeded().stdout;
-    let program = messages
-        .lines()
-        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .find_map(|message| message["executable"].as_str().map(OsString::from))
-        .expect("the example's file");
+    let program = example("in_process").into_os_string();
     let ended = run(&memory, &program, &["car"], &examples())
         .wait()
         .succeeded();

@@ -31,6 +31,20 @@ pub fn example(name: &str) -> PathBuf {
     executable(&built(&["--package=inekf-client", &chosen]), name)
 }
 
+/// The library for C, as a file that programs are linked with and find at run time.
+pub fn c_library() -> PathBuf {
+    let messages = built(&["--package=inekf-c"]);
+    messages
+        .lines()
+        .filter_map(|line| serde_json::from_str::<Value>(line).ok())
+        .filter(|message| message["target"]["name"] == "inekf_c")
+        .filter_map(|message| message["filenames"].as_array().cloned())
+        .flatten()
+        .filter_map(|file| file.as_str().map(PathBuf::from))
+        .find(|file| file.extension().is_some_and(|extension| extension == "so"))
+        .expect("cargo says where the library is")
+}
+
 fn build() -> Programs {
     let messages = built(&[
         "--bins",

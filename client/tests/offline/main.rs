@@ -12,4 +12,5 @@ mod plot;
 mod recordings;
 mod simulate;
 mod simulated_noise;
+mod standstill;
 mod table;

@@ -122,5 +122,5 @@ pub use open::{
 pub use reserve::reserve_shared_memory;
 pub use service::{
     Control, ControlClient, ControlServer, Latest, LatestReader, LatestWriter, PubSub, Publisher,
-    Subscriber, Wake, WakeListener, WakeNotifier,
+    Sample, Subscriber, Wake, WakeListener, WakeNotifier,
 };

@@ -24,6 +24,8 @@ use crate::qos::{self, PubSubQos};
 
 /// Sends messages.
 pub type Publisher<M> = iceoryx2::port::publisher::Publisher<ipc::Service, M, ()>;
+/// A message that was received: it stays where it is in shared memory until this is dropped.
+pub type Sample<M> = iceoryx2::sample::Sample<ipc::Service, M, ()>;
 /// Receives messages.
 pub type Subscriber<M> = iceoryx2::port::subscriber::Subscriber<ipc::Service, M, ()>;
 /// Receives requests and answers them.

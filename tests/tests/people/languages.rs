@@ -15,7 +15,7 @@ use inekf_tests::folder::Folder;
 use inekf_tests::link::{Link, instance};
 use inekf_tests::memory::Memory;
 use inekf_tests::process::{Daemon, Ended, Running, client, eventually};
-use inekf_tests::programs::example;
+use inekf_tests::programs::{c_library, example};
 use inekf_tests::tools;
 
 const CONFIG: &str = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
@@ -39,7 +39,7 @@ fn the_files_in_the_examples_are_what_the_program_writes() {
     let memory = Memory::new();
     for (flag, file) in [
         ("--python", "python/inekf_messages.py"),
-        ("--c", "cpp/inekf_messages.h"),
+        ("--c", "../c/include/inekf_messages.h"),
     ] {
         let written = client(&memory, ["layout", flag]).succeeded().stdout;
         let kept = read(&examples().join(file));
@@ -196,6 +196,49 @@ fn the_python_feeder_is_heard_and_loses_nothing() {
     let last = estimates.last().expect("estimates came");
     assert!(last.p_w_m.iter().all(|p| p.abs() < 0.1), "{last:?}");
     daemon.stop();
+}
+
+#[test]
+fn the_c_interface_feeds_and_reads_from_c_and_from_cpp() {
+    let memory = Memory::new();
+    let interface = examples().join("../c");
+    let library = c_library();
+    let folder = Folder::new();
+    let program = folder.path().join("rest");
+    for (compiler, language) in [("gcc", "-xc"), ("g++", "-xc++")] {
+        let Some(compiler) = tools::program(compiler) else {
+            continue;
+        };
+        let mut command = Command::new(compiler);
+        command
+            .args(["-Wall", "-Wextra", "-Werror", language])
+            .arg(interface.join("example/rest.c"))
+            .arg("-I")
+            .arg(interface.join("include"))
+            .args(["-xnone"])
+            .arg(&library)
+            .arg("-o")
+            .arg(&program);
+        Running::start(command).wait().succeeded();
+        let start = |instance: &str| {
+            let mut command = memory.command(&program);
+            let beside = library.parent().expect("the library's folder");
+            command.arg(instance).env("LD_LIBRARY_PATH", beside);
+            Running::start(command).wait()
+        };
+        let refused = start("no/name");
+        let line = refused.failed_with_one_line(1);
+        assert!(
+            line.contains("instance name \"no/name\" contains '/'"),
+            "{line}"
+        );
+        let daemon = Daemon::start(&memory, "car", CONFIG);
+        assert_eq!(
+            start("car").succeeded().stdout.trim(),
+            "200 samples heard, estimates came; now at 1.00 2.00 3.00 m"
+        );
+        daemon.stop();
+    }
 }
 
 #[test]

@@ -37,5 +37,4 @@ pub mod rows;
 pub mod session;
 pub mod simulate;
 pub mod smoothed;
-pub mod standstill;
 pub mod table;

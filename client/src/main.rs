@@ -15,7 +15,6 @@ use inekf_client::live::feed_live;
 use inekf_client::pace::Speed;
 use inekf_client::replay::{ReplayOptions, replay};
 use inekf_client::simulate::{Scenario, Simulation};
-use inekf_client::standstill::StandstillOptions;
 use inekf_shared::message::{Counters, reason_name};
 use inekf_shared::topic::Instance;
 
@@ -125,9 +124,6 @@ struct ReplayArguments {
     /// Write the covariance as well: the upper triangle, row by row.
     #[arg(long)]
     covariance: bool,
-    /// Feed velocity fixes of zero, of source 0, wherever the IMU says that the vehicle stands.
-    #[arg(long)]
-    zero_velocity: bool,
     /// Without --config: the daemon to feed.
     #[arg(long, value_name = "NAME", default_value = "default")]
     instance: Instance,
@@ -213,7 +209,6 @@ fn run_replay(arguments: ReplayArguments) -> anyhow::Result<()> {
         out: arguments.out,
         smoothed: arguments.smoothed,
         covariance: arguments.covariance,
-        standstill: arguments.zero_velocity.then(StandstillOptions::default),
         instance: arguments.instance,
     };
     let summary = replay(&options)?;

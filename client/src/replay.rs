@@ -20,7 +20,6 @@ use crate::progress::Progress;
 use crate::rows::{RowBuilder, state, triangle};
 use crate::session::{Session, running_model, why_no_estimate};
 use crate::smoothed::SmoothedOutput;
-use crate::standstill::StandstillOptions;
 use crate::table::EstimateWriter;
 
 /// What to replay, and how.
@@ -38,8 +37,6 @@ pub struct ReplayOptions {
     pub smoothed: Option<PathBuf>,
     /// Whether the estimate CSV has the covariance.
     pub covariance: bool,
-    /// Whether velocity fixes of zero are fed where the IMU says that the vehicle stands, and how that is told.
-    pub standstill: Option<StandstillOptions>,
     /// The daemon to feed if none is started.
     pub instance: Instance,
 }
@@ -65,10 +62,7 @@ pub struct ReplaySummary {
 /// The data cannot be read, the daemon not be started or reached, an estimate was lost, or none
 /// came; the error says which.
 pub fn replay(options: &ReplayOptions) -> anyhow::Result<ReplaySummary> {
-    let mut dataset = Dataset::load(&options.dir)?;
-    if let Some(standstill) = &options.standstill {
-        dataset.add_standstill(standstill);
-    }
+    let dataset = Dataset::load(&options.dir)?;
     let (daemon, instance) = match &options.config {
         Some(config) => {
             let instance = private_instance("replay")?;

@@ -12,5 +12,4 @@ mod plot;
 mod recordings;
 mod simulate;
 mod simulated_noise;
-mod standstill;
 mod table;

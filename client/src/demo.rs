@@ -8,19 +8,15 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use hdrhistogram::Histogram;
 use inekf_shared::clock::monotonic_ns;
-use inekf_shared::message::{ESTIMATE_PROPAGATED, EstimateSe23};
+use inekf_shared::message::{Counters, ESTIMATE_PROPAGATED, ESTIMATE_UPDATED, EstimateSe23};
 
 use crate::daemon::{Daemon, private_instance};
 use crate::dataset::Dataset;
-use crate::evaluate::{
-    DEFAULT_MAX_GAP_NS, Deviations, ErrorSample, Summary, Trajectory, deviations, errors, summarise,
-};
+use crate::evaluate::Summary;
 use crate::pace::Pace;
-use crate::plot::{
-    LatencySeries, Report, Section, Table, TrajectoryPlot, error_bands, error_panels, format_ns,
-    latency, trajectory,
-};
+use crate::plot::{LatencySeries, format_ns};
 use crate::progress::Progress;
+use crate::report::{Built, Material, NisSample, build};
 use crate::rows::{RowBuilder, row};
 use crate::session::Session;
 use crate::simulate::{Scenario, SimulationOptions, simulate};
@@ -119,38 +115,58 @@ pub fn demo(options: &DemoOptions) -> anyhow::Result<()> {
     );
     let driven = drive(&dataset, &mut Session::open(&instance)?);
     let stopped = daemon.stop();
-    let (rows, latencies) = driven?;
+    let driven = driven?;
     stopped?;
 
-    let errors = errors(
-        &Trajectory::from_estimates(&rows),
-        &Trajectory::from_truth(&dataset.truth),
-        DEFAULT_MAX_GAP_NS,
+    let subtitle = format!(
+        "{}: {} s at {} Hz, seed {}; heading and speed unknown at the start",
+        options.scenario.name(),
+        options.duration_s,
+        options.rate_hz,
+        options.seed
     );
-    let Some(summary) = summarise(&errors, (CONVERGED_AFTER_S * 1e9) as u64) else {
+    let built = build(&Material {
+        title: "inekf demo",
+        subtitle: &subtitle,
+        rows: &driven.rows,
+        truth: &dataset.truth,
+        fixes: &dataset.position,
+        settled_s: CONVERGED_AFTER_S,
+        nis: &driven.nis,
+        latencies: &driven.latencies.series(),
+        latency_note: "Both processes on this machine, spinning.",
+        counters: Some(driven.counters),
+    })?;
+    let Some(summary) = &built.summary else {
         bail!("the drive is too short: give it more than {CONVERGED_AFTER_S} s");
     };
-    print_summary(&summary, &latencies);
-    let report = write_report(options, &dataset, &rows, &errors, &summary, &latencies)?;
-    println!("report   {}", report.display());
+    print_summary(summary, &driven.latencies);
+    println!("report   {}", write_report(&options.out, &built)?.display());
     Ok(())
+}
+
+/// What came of the drive.
+struct Driven {
+    rows: Vec<EstimateRow>,
+    nis: Vec<NisSample>,
+    latencies: Latencies,
+    counters: Counters,
 }
 
 /// How long the answer to a sample is polled for; before the daemon has a state there is none.
 const ANSWER_WITHIN: Duration = Duration::from_millis(1);
 
 /// Feeds in real time, reads the answer to each sample as soon as it comes, and sleeps in between.
-fn drive(
-    dataset: &Dataset,
-    session: &mut Session,
-) -> anyhow::Result<(Vec<EstimateRow>, Latencies)> {
+fn drive(dataset: &Dataset, session: &mut Session) -> anyhow::Result<Driven> {
     let mut latencies = Latencies::new()?;
     let mut rows = Vec::with_capacity(dataset.imu.len());
+    let mut nis = Vec::with_capacity(dataset.position.len());
     let mut builder = RowBuilder::default();
     let newest_ns = Cell::new(None);
     let mut take = |estimate: EstimateSe23| {
         latencies.record(&estimate, monotonic_ns());
         newest_ns.set(Some(estimate.head.stamp_ns));
+        nis.extend(nis_of(&estimate));
         rows.extend(builder.push(estimate).as_ref().map(row));
         Ok(())
     };
@@ -169,10 +185,27 @@ fn drive(
         }
         progress.advance(sent);
     }
-    session.settle(&mut take)?;
+    let answer = session.settle(&mut take)?;
     progress.finish();
     rows.extend(builder.finish().as_ref().map(row));
-    Ok((rows, latencies))
+    Ok(Driven {
+        rows,
+        nis,
+        latencies,
+        counters: answer.counters,
+    })
+}
+
+/// The NIS of the fix that was fused into this estimate, if one was: all fixes here are of position.
+fn nis_of(estimate: &EstimateSe23) -> Option<NisSample> {
+    let head = &estimate.head;
+    let source = usize::try_from(head.source).ok()?;
+    let nis = *head.nis.get(source)?;
+    (head.flags & ESTIMATE_UPDATED != 0).then_some(NisSample {
+        stamp_ns: head.stamp_ns,
+        nis,
+        degrees: 3,
+    })
 }
 
 fn print_summary(summary: &Summary, latencies: &Latencies) {
@@ -206,104 +239,15 @@ fn quantiles(histogram: &Histogram<u64>) -> [String; 4] {
     .map(|ns| format_ns(ns as f64))
 }
 
-fn write_report(
-    options: &DemoOptions,
-    dataset: &Dataset,
-    rows: &[EstimateRow],
-    errors: &[ErrorSample],
-    summary: &Summary,
-    latencies: &Latencies,
-) -> anyhow::Result<PathBuf> {
-    let top_view = |trajectory: &Trajectory| -> Vec<[f64; 2]> {
-        let poses = trajectory.poses().iter();
-        poses.map(|pose| [pose.p_w_m.x, pose.p_w_m.y]).collect()
-    };
-    let truth = top_view(&Trajectory::from_truth(&dataset.truth));
-    let estimate = top_view(&Trajectory::from_estimates(rows));
-    let fixes: Vec<[f64; 2]> = dataset
-        .position
-        .iter()
-        .map(|fix| [fix.position_w_m[0], fix.position_w_m[1]])
-        .collect();
-    let plot = TrajectoryPlot {
-        truth: &truth,
-        estimate: &estimate,
-        fixes: &fixes,
-    };
-    let trajectory = trajectory("Top view of the drive", &plot)?;
-    let sigmas: Vec<Deviations> = rows.iter().filter_map(deviations).collect();
-    let bands = error_bands("Error against the truth", &error_panels(errors, &sigmas, 0))?;
-    let latency_plot = latency("Latency per sample", &latencies.series())?;
-
+/// Writes the page and its figures into the folder; returns the page's path.
+fn write_report(out: &Path, built: &Built) -> anyhow::Result<PathBuf> {
     let write = |name: &str, text: &str| -> anyhow::Result<PathBuf> {
-        let path: PathBuf = Path::new(&options.out).join(name);
+        let path = out.join(name);
         fs::write(&path, text).with_context(|| format!("writing {}", path.display()))?;
         Ok(path)
     };
-    write("trajectory.svg", &trajectory)?;
-    write("error.svg", &bands)?;
-    write("latency.svg", &latency_plot)?;
-    let section = |heading: &str, text: String, table: Option<Table>, svg: String| Section {
-        heading: heading.to_owned(),
-        text,
-        table,
-        svg,
-    };
-    let report = Report {
-        title: "inekf demo".to_owned(),
-        subtitle: format!(
-            "{}: {} s at {} Hz, seed {}; heading and speed unknown at the start",
-            options.scenario.name(),
-            options.duration_s,
-            options.rate_hz,
-            options.seed
-        ),
-        sections: vec![
-            section("Trajectory", String::new(), None, trajectory),
-            section(
-                "Error",
-                format!("RMSE from {CONVERGED_AFTER_S} s on."),
-                Some(error_table(summary)),
-                bands,
-            ),
-            section(
-                "Latency",
-                "Both processes on this machine, spinning.".to_owned(),
-                Some(latency_table(latencies)),
-                latency_plot,
-            ),
-        ],
-    };
-    write("report.html", &report.to_html())
-}
-
-fn error_table(summary: &Summary) -> Table {
-    let position = summary.position_rmse_m;
-    let cells = |name: &str, value: f64, unit: &str| {
-        vec![name.to_owned(), format!("{value:.3}"), unit.to_owned()]
-    };
-    Table {
-        header: ["quantity", "RMSE", "unit"].map(str::to_owned).to_vec(),
-        rows: vec![
-            cells("position east", position.x, "m"),
-            cells("position north", position.y, "m"),
-            cells("position up", position.z, "m"),
-            cells("heading", summary.heading_rmse_rad.to_degrees(), "deg"),
-            cells("attitude", summary.attitude_rmse_rad.to_degrees(), "deg"),
-        ],
+    for (name, svg) in &built.figures {
+        write(name, svg)?;
     }
-}
-
-fn latency_table(latencies: &Latencies) -> Table {
-    let rows = latencies.series().map(|series| {
-        let mut cells = vec![series.name.to_owned()];
-        cells.extend(quantiles(series.histogram));
-        cells
-    });
-    Table {
-        header: ["", "p50", "p99", "p99.9", "max"]
-            .map(str::to_owned)
-            .to_vec(),
-        rows: rows.to_vec(),
-    }
+    write("report.html", &built.html)
 }

@@ -329,7 +329,7 @@ pub fn nees(error: &[f64], covariance_triangle: &[f64]) -> Option<f64> {
 }
 
 /// The symmetric matrix with this upper triangle, if it has the right number of entries.
-fn symmetric(triangle: &[f64], dimension: usize) -> Option<DMatrix<f64>> {
+pub(crate) fn symmetric(triangle: &[f64], dimension: usize) -> Option<DMatrix<f64>> {
     if triangle.len() != triangle_len(dimension) {
         return None;
     }

@@ -13,15 +13,21 @@
 //! Conventions everywhere: SI units and radians, world ENU, body FLU, quaternions Hamilton, body to world, stored
 //! `x, y, z, w`; stamps are `u64` nanoseconds of the sensor clock.
 
+pub mod consistency;
 pub mod control;
 pub mod daemon;
 pub mod dataset;
 pub mod demo;
 pub mod evaluate;
+pub mod exchange;
 pub mod feed;
+pub mod geodetic;
+pub mod import;
 pub mod initial;
+pub mod layout;
 pub mod live;
 pub mod model;
+pub mod monitor;
 pub mod noise;
 pub mod pace;
 pub mod plot;
@@ -29,6 +35,7 @@ pub mod progress;
 pub mod read;
 pub mod recording;
 pub mod replay;
+pub mod report;
 pub mod rows;
 pub mod session;
 pub mod simulate;

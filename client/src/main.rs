@@ -1,5 +1,7 @@
 //! `inekf-client`: simulates, replays and shows what the estimation daemon makes of it.
 
+mod commands;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -57,6 +59,16 @@ enum Command {
     Record(RecordArguments),
     /// Asks something of a daemon.
     Control(ControlArguments),
+    /// Watches a running daemon: state, rates, uncertainty, fixes, latency.
+    Monitor(commands::monitor::Arguments),
+    /// Writes a page about a run: trajectory, errors against the truth with their bands, NEES.
+    Report(commands::report::Arguments),
+    /// Writes estimates in the formats of other tools: TUM, MCAP, or a CSV for people.
+    Export(commands::export::Arguments),
+    /// Makes a dataset folder of an EuRoC sequence, or its truth of a TUM trajectory.
+    Import(commands::import::Arguments),
+    /// Prints the layout of the messages for C and C++, for Python, or as JSON.
+    Layout(commands::layout::Arguments),
 }
 
 #[derive(Args)]
@@ -181,6 +193,11 @@ fn main() -> ExitCode {
         Command::Replay(arguments) => run_replay(arguments),
         Command::Record(arguments) => run_record(arguments),
         Command::Control(arguments) => run_control(&arguments),
+        Command::Monitor(arguments) => commands::monitor::run(&arguments),
+        Command::Report(arguments) => commands::report::run(&arguments),
+        Command::Export(arguments) => commands::export::run(&arguments),
+        Command::Import(arguments) => commands::import::run(&arguments),
+        Command::Layout(arguments) => commands::layout::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

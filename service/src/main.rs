@@ -10,7 +10,7 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 use inekf::filter::UpdateError;
 use inekf_service::config::{self, Config};
-use inekf_service::daemon::{self, Order};
+use inekf_service::daemon::{self, Order, supervisor};
 use inekf_service::engine::{self, Engine, History, Model, Use};
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, inspect};
@@ -141,7 +141,13 @@ fn serve(file: &Path, named: Option<&str>, stepped: bool) -> anyhow::Result<()> 
         stepped,
         stop: &stop,
     };
-    daemon::serve(&order, || say_ready(&config, &instances))
+    let outcome = daemon::serve(&order, || {
+        say_ready(&config, &instances)?;
+        supervisor::ready();
+        Ok(())
+    });
+    supervisor::stopping();
+    outcome
 }
 
 /// Why a configuration that reads well cannot be run.
@@ -177,13 +183,18 @@ fn say_ready(config: &Config, instances: &[Instance]) -> anyhow::Result<()> {
     .context("writing the ready line")
 }
 
-/// Logs to standard error: information by default, iceoryx2 only when it warns.
+/// Logs to standard error: information by default, iceoryx2 only when it warns. Where that is the journal, which keeps
+/// the time itself, lines have none.
 fn start_logging() {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env()
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("info,iceoryx2=error"));
-    tracing_subscriber::fmt()
+    let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .init();
+        .with_ansi(std::io::stderr().is_terminal());
+    if std::env::var_os("JOURNAL_STREAM").is_some() {
+        log.without_time().init();
+    } else {
+        log.init();
+    }
 }

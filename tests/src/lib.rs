@@ -11,6 +11,7 @@
 //! * [`in_process`]: the same engine without a process, fed in the daemon's order;
 //! * [`replay`]: the real `inekf-client replay`;
 //! * [`score`]: estimates against truth and fixes;
+//! * [`tools`]: what may be missing on a machine;
 //! * [`consistency`]: whether errors are as large as their covariance says.
 //!
 //! The harness panics where a test could not go on: it is part of the tests. SI units and radians, world ENU, body FLU.
@@ -27,3 +28,4 @@ pub mod process;
 pub mod programs;
 pub mod replay;
 pub mod score;
+pub mod tools;

@@ -25,12 +25,45 @@ pub fn programs() -> &'static Programs {
     PROGRAMS.get_or_init(build)
 }
 
+/// The file of an example of the client, built in the profile of this test.
+pub fn example(name: &str) -> PathBuf {
+    let chosen = format!("--example={name}");
+    executable(&built(&["--package=inekf-client", &chosen]), name)
+}
+
+/// The library for C, as a file that programs are linked with and find at run time.
+pub fn c_library() -> PathBuf {
+    let messages = built(&["--package=inekf-c"]);
+    messages
+        .lines()
+        .filter_map(|line| serde_json::from_str::<Value>(line).ok())
+        .filter(|message| message["target"]["name"] == "inekf_c")
+        .filter_map(|message| message["filenames"].as_array().cloned())
+        .flatten()
+        .filter_map(|file| file.as_str().map(PathBuf::from))
+        .find(|file| file.extension().is_some_and(|extension| extension == "so"))
+        .expect("cargo says where the library is")
+}
+
 fn build() -> Programs {
+    let messages = built(&[
+        "--bins",
+        "--package=inekf-service",
+        "--package=inekf-client",
+    ]);
+    Programs {
+        service: executable(&messages, "inekf-service"),
+        client: executable(&messages, "inekf-client"),
+    }
+}
+
+/// Builds, and returns cargo's messages.
+fn built(what: &[&str]) -> String {
     let mut command = Command::new(env!("CARGO"));
     command
         .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .args(["build", "--quiet", "--bins", "--message-format=json"])
-        .args(["--package=inekf-service", "--package=inekf-client"])
+        .args(["build", "--quiet", "--message-format=json"])
+        .args(what)
         .stderr(Stdio::inherit());
     match profile().as_str() {
         "debug" => {}
@@ -38,11 +71,7 @@ fn build() -> Programs {
     }
     let output = command.output().expect("cargo cannot be started");
     assert!(output.status.success(), "the programs cannot be built");
-    let messages = String::from_utf8(output.stdout).expect("cargo's messages are UTF-8");
-    Programs {
-        service: executable(&messages, "inekf-service"),
-        client: executable(&messages, "inekf-client"),
-    }
+    String::from_utf8(output.stdout).expect("cargo's messages are UTF-8")
 }
 
 /// The folder of this program's profile: a test program is `PROFILE/deps/NAME`, any other `PROFILE/NAME`.

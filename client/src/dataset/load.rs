@@ -5,6 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
+use super::geodetic;
 use super::meta::Meta;
 use super::{
     Dataset, DatasetError, HeadingRow, ImuBias, ImuRow, Odometry, Odometry2dRow, Odometry3dRow,
@@ -61,15 +62,30 @@ impl Dataset {
         folder.require_if_chosen(&options.position_file, &defaults.position_file);
         folder.require_if_chosen(&options.truth_file, &defaults.truth_file);
 
+        let mut meta = folder.meta()?;
+        let mut frame = geodetic::frame_of(&meta, &mut folder.faults);
+        // In the order in which faults are listed.
+        let imu = folder.table("imu.csv", IMU, read_imu)?.unwrap_or_default();
+        let odometry = folder
+            .table("odometry.csv", ODOMETRY_2D, read_odometry)?
+            .unwrap_or_default();
+        let position = folder
+            .table(&options.position_file, POSITION, |table, faults| {
+                if table.has("lat") {
+                    geodetic::read_position(table, &mut frame, faults)
+                } else {
+                    read_position(table, faults)
+                }
+            })?
+            .unwrap_or_default();
+        if let Some(frame) = frame {
+            geodetic::note_frame(&mut meta, &frame);
+        }
         let mut dataset = Self {
-            meta: folder.meta()?,
-            imu: folder.table("imu.csv", IMU, read_imu)?.unwrap_or_default(),
-            odometry: folder
-                .table("odometry.csv", ODOMETRY_2D, read_odometry)?
-                .unwrap_or_default(),
-            position: folder
-                .table(&options.position_file, POSITION, read_position)?
-                .unwrap_or_default(),
+            meta,
+            imu,
+            odometry,
+            position,
             velocity: folder
                 .table("velocity.csv", VELOCITY, read_velocity)?
                 .unwrap_or_default(),
@@ -126,7 +142,7 @@ struct Folder<'a> {
     faults: Faults,
 }
 
-type Table = CsvTable<BufReader<File>>;
+pub(super) type Table = CsvTable<BufReader<File>>;
 
 impl Folder<'_> {
     fn path(&self, file: &str) -> PathBuf {
@@ -225,7 +241,7 @@ const GYRO_BIAS: [&str; 3] = ["bgx", "bgy", "bgz"];
 const ACCEL_BIAS: [&str; 3] = ["bax", "bay", "baz"];
 
 /// Reads all rows if the columns named in `header` are there.
-fn read_rows<T>(
+pub(super) fn read_rows<T>(
     table: Table,
     header: &str,
     faults: &mut Faults,
@@ -281,7 +297,10 @@ fn read_odometry(table: Table, faults: &mut Faults) -> Odometry {
 
 /// The stamp and source of a fix: stamps must increase per source, because receivers interleave
 /// freely.
-fn fix_stamp(row: &mut RowReader<'_>, last: &mut BTreeMap<u32, Option<u64>>) -> Option<(u64, u32)> {
+pub(super) fn fix_stamp(
+    row: &mut RowReader<'_>,
+    last: &mut BTreeMap<u32, Option<u64>>,
+) -> Option<(u64, u32)> {
     let source = row.source()?;
     let stamp_ns = row.stamp_after("t_ns", last.entry(source).or_default())?;
     Some((stamp_ns, source))

@@ -10,7 +10,8 @@
 //! | `initial` | the state to start from: plane `t_ns,theta,x,y`; space `t_ns,qw,qx,qy,qz,vx,vy,vz,x,y,z`, perhaps `bgx,bgy,bgz,bax,bay,baz`; or as arrays `q_wb` (x, y, z, w), `v_w`, `p_w`, `gyro_bias`, `accel_bias` |
 //! | `P0_diag` | variances of the initial left-invariant error: 3 (plane: theta, x, y), 6 (rotation, position), 9 (rotation, velocity, position) or 15 (and gyro and accelerometer bias) |
 //!
-//! All other keys are kept and written back.
+//! `origin_lat_lon_alt` (degrees, degrees, m above the ellipsoid) is where the world has its zero, for positions by
+//! latitude and longitude. All other keys are kept and written back.
 
 use serde_json::{Map, Value, json};
 

@@ -5,6 +5,7 @@
 //! | `imu.csv` | `t_ns,gx,gy,gz,ax,ay,az`: rad/s; specific force, m/s^2; body FLU |
 //! | `odometry.csv` | planar `t_ns,dtheta,dx,dy`, spatial `t_ns,rx,ry,rz,dx,dy,dz`: body motion since the previous row |
 //! | `position.csv` | `t_ns,x,y,z,sx,sy,sz[,source]`: world ENU, m, one sigma; `z` and `sz` empty in the plane |
+//! | | or `t_ns,lat,lon,alt,sx,sy,sz[,source]`: degrees and metres above the ellipsoid (WGS 84), sigmas in ENU metres; the world's origin is `origin_lat_lon_alt` of `meta.json`, else the first fix |
 //! | `velocity.csv` | `t_ns,vx,vy,vz,sx,sy,sz[,source]`: world ENU, m/s, one sigma |
 //! | `heading.csv` | `t_ns,heading,sigma[,source]`: rad, counter-clockwise from east |
 //! | `truth.csv` | `t_ns,qw,qx,qy,qz,vx,vy,vz,x,y,z` (may add `bgx,bgy,bgz,bax,bay,baz`), or planar `t_ns,theta,x,y` |
@@ -15,6 +16,7 @@
 
 mod events;
 mod fit;
+mod geodetic;
 mod load;
 mod meta;
 mod rows;
@@ -31,6 +33,7 @@ pub use rows::{
     HeadingRow, ImuBias, ImuRow, Odometry2dRow, Odometry3dRow, PositionRow, Truth2dRow, TruthRow,
     VelocityRow,
 };
+pub use save::save_truth;
 
 use crate::table::Faults;
 

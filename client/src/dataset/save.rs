@@ -42,7 +42,9 @@ impl Dataset {
         write_file(dir, "heading.csv", !self.heading.is_empty(), |out| {
             self.write_heading(out)
         })?;
-        write_file(dir, "truth.csv", has_truth, |out| self.write_truth(out))
+        write_file(dir, "truth.csv", has_truth, |out| {
+            write_truth(&self.truth, out)
+        })
     }
 
     fn write_imu(&self, out: &mut Out) -> io::Result<()> {
@@ -110,44 +112,59 @@ impl Dataset {
         }
         Ok(())
     }
+}
 
-    fn write_truth(&self, out: &mut Out) -> io::Result<()> {
-        match &self.truth {
-            Truth::None => {}
-            Truth::Planar(rows) => {
-                writeln!(out, "t_ns,theta,x,y")?;
-                for row in rows {
-                    write_row(out, row.stamp_ns, &[&[row.theta_rad], &row.p_w_m])?;
-                }
+/// Writes the `truth.csv` of a folder, which is made if need be, and leaves its other files alone.
+///
+/// # Errors
+/// [`DatasetError::File`] with the file that could not be written.
+pub fn save_truth(dir: impl AsRef<Path>, truth: &Truth) -> Result<(), DatasetError> {
+    let dir = dir.as_ref();
+    fs::create_dir_all(dir).map_err(|cause| DatasetError::File {
+        path: dir.to_owned(),
+        cause,
+    })?;
+    write_file(dir, "truth.csv", *truth != Truth::None, |out| {
+        write_truth(truth, out)
+    })
+}
+
+fn write_truth(truth: &Truth, out: &mut Out) -> io::Result<()> {
+    match truth {
+        Truth::None => {}
+        Truth::Planar(rows) => {
+            writeln!(out, "t_ns,theta,x,y")?;
+            for row in rows {
+                write_row(out, row.stamp_ns, &[&[row.theta_rad], &row.p_w_m])?;
             }
-            Truth::Spatial(rows) => {
-                // Bias columns only if every row has them: a column cannot be there for some rows.
-                let with_bias = !rows.is_empty() && rows.iter().all(|row| row.bias.is_some());
-                let bias_columns = if with_bias {
-                    ",bgx,bgy,bgz,bax,bay,baz"
-                } else {
-                    ""
-                };
-                writeln!(out, "t_ns,qw,qx,qy,qz,vx,vy,vz,x,y,z{bias_columns}")?;
-                for row in rows {
-                    let [x, y, z, w] = row.q_wb;
-                    let q_wxyz = [w, x, y, z];
-                    match row.bias.filter(|_| with_bias) {
-                        None => write_row(out, row.stamp_ns, &[&q_wxyz, &row.v_w_mps, &row.p_w_m])?,
-                        Some(bias) => {
-                            let (gyro, accel) = (&bias.gyro_rps, &bias.accel_mps2);
-                            write_row(
-                                out,
-                                row.stamp_ns,
-                                &[&q_wxyz, &row.v_w_mps, &row.p_w_m, gyro, accel],
-                            )?;
-                        }
+        }
+        Truth::Spatial(rows) => {
+            // Bias columns only if every row has them: a column cannot be there for some rows.
+            let with_bias = !rows.is_empty() && rows.iter().all(|row| row.bias.is_some());
+            let bias_columns = if with_bias {
+                ",bgx,bgy,bgz,bax,bay,baz"
+            } else {
+                ""
+            };
+            writeln!(out, "t_ns,qw,qx,qy,qz,vx,vy,vz,x,y,z{bias_columns}")?;
+            for row in rows {
+                let [x, y, z, w] = row.q_wb;
+                let q_wxyz = [w, x, y, z];
+                match row.bias.filter(|_| with_bias) {
+                    None => write_row(out, row.stamp_ns, &[&q_wxyz, &row.v_w_mps, &row.p_w_m])?,
+                    Some(bias) => {
+                        let (gyro, accel) = (&bias.gyro_rps, &bias.accel_mps2);
+                        write_row(
+                            out,
+                            row.stamp_ns,
+                            &[&q_wxyz, &row.v_w_mps, &row.p_w_m, gyro, accel],
+                        )?;
                     }
                 }
             }
         }
-        Ok(())
     }
+    Ok(())
 }
 
 /// Writes one row: the stamp, then all groups of numbers.

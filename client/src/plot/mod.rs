@@ -5,6 +5,7 @@
 //! extremes are kept.
 
 mod canvas;
+mod consistency;
 mod error_band;
 mod latency;
 pub mod palette;
@@ -12,6 +13,7 @@ mod report;
 mod thin;
 mod trajectory;
 
+pub use consistency::{ConsistencyPlot, consistency};
 pub use error_band::{Panel, error_bands, error_panels};
 pub use latency::{LatencySeries, format_ns, latency};
 pub use report::{Report, Section, Table};

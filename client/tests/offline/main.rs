@@ -2,7 +2,10 @@
 
 mod dataset;
 mod evaluate;
+mod exchange;
+mod geodetic;
 mod journal;
+mod look;
 mod meta;
 mod models;
 mod planar;

@@ -10,12 +10,11 @@ use inekf_shared::message::{
     JOURNAL_SETTLE, JOURNAL_VELOCITY, Message, REASON_WRONG_MODEL, StateVector, Zero,
 };
 
-use super::ports::EstimatePort;
 use super::smoothed::SmoothedPort;
 use super::vehicle::Terms;
 use crate::engine::resume::ResumeSettings;
 use crate::engine::tally::Refusal;
-use crate::engine::{Engine, History, Model};
+use crate::engine::{Engine, History, Model, Outbox};
 
 /// Does what `request` asks, and answers. Whatever its bytes are, a refusal says why.
 ///
@@ -24,7 +23,7 @@ pub fn answer<M: Model, H: History<M>>(
     engine: &mut Engine<M, H>,
     request: &ControlRequest,
     terms: &Terms<'_>,
-    estimates: &mut EstimatePort<M::Estimate>,
+    estimates: &mut impl Outbox<M::Estimate>,
     smoothed: &mut SmoothedPort,
 ) -> ControlResponse {
     let mut published = 0;
@@ -89,7 +88,7 @@ fn take<M: Model, H: History<M>>(
     engine: &mut Engine<M, H>,
     request: &ControlRequest,
     terms: &Terms<'_>,
-    estimates: &mut EstimatePort<M::Estimate>,
+    estimates: &mut impl Outbox<M::Estimate>,
 ) -> Result<(), &'static str> {
     match request.argument {
         kind @ (JOURNAL_IMU | JOURNAL_ODOMETRY_2D | JOURNAL_ODOMETRY_3D) => {

@@ -7,6 +7,7 @@ use inekf_shared::message::{
 };
 use tracing::{info, warn};
 
+use super::supervisor;
 use crate::engine::resume::Resumption;
 use crate::engine::tally::Tally;
 
@@ -90,6 +91,7 @@ impl Watch {
         let failures = moment.failures + moment.journal_failures;
         self.log((state, waiting_for), failures, tally);
         self.log_resumption(moment.resumption);
+        supervisor::alive(state_name(state));
         Health {
             stamp_ns: moment.now_ns,
             uptime_ns: moment.now_ns - self.started_ns,

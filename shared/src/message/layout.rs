@@ -14,22 +14,73 @@ use serde::de::DeserializeOwned;
 pub trait Zero: Copy {
     /// The value whose bytes are all zero.
     const ZERO: Self;
+
+    /// What a field of this type holds.
+    const TYPE: FieldType;
 }
 
 impl Zero for u8 {
     const ZERO: Self = 0;
+    const TYPE: FieldType = FieldType::U8;
 }
 impl Zero for u32 {
     const ZERO: Self = 0;
+    const TYPE: FieldType = FieldType::U32;
 }
 impl Zero for u64 {
     const ZERO: Self = 0;
+    const TYPE: FieldType = FieldType::U64;
 }
 impl Zero for f64 {
     const ZERO: Self = 0.0;
+    const TYPE: FieldType = FieldType::F64;
 }
 impl<T: Zero, const N: usize> Zero for [T; N] {
     const ZERO: Self = [T::ZERO; N];
+    const TYPE: FieldType = FieldType::Array(&T::TYPE, N);
+}
+
+/// What a field of a message holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FieldType {
+    /// An octet.
+    U8,
+    /// An unsigned integer of 32 bits.
+    U32,
+    /// An unsigned integer of 64 bits.
+    U64,
+    /// A double.
+    F64,
+    /// So many of one type, one after the other.
+    Array(&'static FieldType, usize),
+    /// A struct of the contract.
+    Struct(&'static Layout),
+}
+
+/// One field of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Its name.
+    pub name: &'static str,
+    /// Bytes before it.
+    pub offset: usize,
+    /// What it holds.
+    pub holds: FieldType,
+}
+
+/// The layout of a message, for writing it down in other languages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Name of the struct.
+    pub name: &'static str,
+    /// The name under which iceoryx2 knows it.
+    pub type_name: &'static str,
+    /// Its size, bytes.
+    pub size: usize,
+    /// Its alignment, bytes.
+    pub align: usize,
+    /// Every field, in order, without a hole.
+    pub fields: &'static [Field],
 }
 
 /// A message of the wire contract: fixed layout, any bytes valid, free of padding.
@@ -42,11 +93,19 @@ pub trait Message:
     /// Name and byte offset of every field, in order: for layout tests in other languages.
     const FIELDS: &'static [(&'static str, usize)];
 
+    /// The whole layout.
+    const WIRE: Layout;
+
     /// The bytes of the message, as they lie in shared memory.
     fn as_bytes(&self) -> &[u8];
 
     /// The message that has these bytes; `None` if they are too many or too few.
     fn from_bytes(bytes: &[u8]) -> Option<Self>;
+}
+
+/// What the field that `_project` borrows holds.
+pub(crate) const fn type_of_field<T, F: Zero>(_project: fn(&T) -> &F) -> FieldType {
+    F::TYPE
 }
 
 /// Size of the field that `_project` borrows.
@@ -61,6 +120,8 @@ macro_rules! layout {
     }) => {
         impl $crate::message::Zero for $name {
             const ZERO: Self = Self { $($field: $crate::message::Zero::ZERO),+ };
+            const TYPE: $crate::message::FieldType =
+                $crate::message::FieldType::Struct(&<Self as $crate::message::Message>::WIRE);
         }
 
         impl Default for $name {
@@ -87,6 +148,17 @@ macro_rules! layout {
                 // SAFETY: the bytes are as many as the struct has, and any bytes are a value of numbers (`Zero`).
                 Some(unsafe { bytes.as_ptr().cast::<Self>().read_unaligned() })
             }
+            const WIRE: $crate::message::Layout = $crate::message::Layout {
+                name: stringify!($name),
+                type_name: $type_name,
+                size: $size,
+                align: $align,
+                fields: &[$($crate::message::Field {
+                    name: stringify!($field),
+                    offset: $offset,
+                    holds: $crate::message::layout::type_of_field::<$name, _>(|message| &message.$field),
+                }),+],
+            };
         }
 
         const _: () = {

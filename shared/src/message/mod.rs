@@ -57,12 +57,33 @@ pub use journal::{
     JOURNAL_PAYLOAD_LEN, JOURNAL_POSITION, JOURNAL_RESUME, JOURNAL_SETTLE, JOURNAL_VELOCITY,
     JournalEntry, journal_kind_name,
 };
-pub use layout::{Message, Zero};
+pub use layout::{Field, FieldType, Layout, Message, Zero};
 pub use noise::{NOISE_DENSITY, NOISE_PER_SAMPLE, ProcessNoise};
 pub use odometry::{Odometry2d, Odometry3d};
 pub use position::PositionFix;
 pub use smoothed::{SMOOTHED_CUT, SMOOTHED_FLAGS, SmoothedState};
 pub use velocity::VelocityFix;
+
+/// Every struct of the contract, each after those that it holds.
+pub const LAYOUTS: [&Layout; 17] = [
+    &Header::WIRE,
+    &ImuSample::WIRE,
+    &Odometry2d::WIRE,
+    &Odometry3d::WIRE,
+    &PositionFix::WIRE,
+    &VelocityFix::WIRE,
+    &HeadingFix::WIRE,
+    &Counters::WIRE,
+    &EstimateHead::WIRE,
+    &EstimateSe23::WIRE,
+    &EstimateSe3::WIRE,
+    &EstimateSe2::WIRE,
+    &SmoothedState::WIRE,
+    &Health::WIRE,
+    &StateVector::WIRE,
+    &ControlRequest::WIRE,
+    &ControlResponse::WIRE,
+];
 
 /// How many sources of position an estimate reports on: source ids are `0..MAX_SOURCES`.
 pub const MAX_SOURCES: usize = 8;

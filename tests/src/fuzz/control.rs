@@ -2,16 +2,19 @@
 //!
 //! The first byte chooses the configuration; requests follow one after the other.
 
+use inekf_service::config::Config;
+use inekf_service::daemon::Terms;
 use inekf_service::daemon::control::answer;
 use inekf_service::daemon::smoothed::SmoothedPort;
 use inekf_service::engine::{Engine, History, Model, Use, build};
 use inekf_shared::message::{
-    CONTROL_BARRIER, CONTROL_OK, CONTROL_REFUSED, CONTROL_RESET, CONTROL_SET_STATE,
-    CONTROL_SMOOTHED, CONTROL_SNAPSHOT, ControlRequest, MODEL_IMU, MODEL_ODOMETRY_2D,
+    CONTROL_BARRIER, CONTROL_CONFIG, CONTROL_OK, CONTROL_PAUSE, CONTROL_REFUSED,
+    CONTROL_RELOAD_NOISE, CONTROL_RESET, CONTROL_RESUME, CONTROL_SET_STATE, CONTROL_SMOOTHED,
+    CONTROL_SNAPSHOT, CONTROL_TAKE, ControlRequest, MODEL_IMU, MODEL_ODOMETRY_2D,
     MODEL_ODOMETRY_3D, StateVector, Zero, triangle_index,
 };
 
-use super::messages::{assert_finite, bits, configs};
+use super::messages::{Nowhere, assert_finite, bits, configs};
 use super::raw::{bytes_of, take};
 
 /// The target.
@@ -21,23 +24,36 @@ pub fn run(bytes: &[u8]) {
     };
     let configs = configs();
     let config = &configs[usize::from(*choice) % configs.len()];
-    if build(config, Ask(rest)).is_err() {
+    let ask = Ask {
+        config,
+        bytes: rest,
+    };
+    if build(config, ask).is_err() {
         panic!("the configuration is good");
     }
 }
 
-/// Sends requests to an engine.
-struct Ask<'a>(&'a [u8]);
+/// Sends requests to an engine, inputs among them.
+struct Ask<'a> {
+    config: &'a Config,
+    bytes: &'a [u8],
+}
 
 impl Use for Ask<'_> {
     type Output = ();
 
     fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) {
-        let mut bytes = self.0;
+        let terms = Terms {
+            config: self.config,
+            config_text: "model = 'imu'",
+            stepped: true,
+            unused_checkpoint: false,
+        };
+        let mut bytes = self.bytes;
         let mut smoothed = SmoothedPort::closed();
         while let Some((request, rest)) = take::<ControlRequest>(bytes) {
             let before = engine.snapshot();
-            let response = answer(&mut engine, &request, &mut smoothed);
+            let response = answer(&mut engine, &request, &terms, &mut Nowhere, &mut smoothed);
             assert_eq!(response.request_id, request.request_id);
             match response.status {
                 CONTROL_OK => assert_eq!(response.reason(), ""),
@@ -84,6 +100,11 @@ pub fn seeds() -> Vec<Vec<u8>> {
                 CONTROL_BARRIER,
                 CONTROL_SMOOTHED,
                 CONTROL_RESET,
+                CONTROL_PAUSE,
+                CONTROL_RESUME,
+                CONTROL_RELOAD_NOISE,
+                CONTROL_CONFIG,
+                CONTROL_TAKE,
                 CONTROL_SET_STATE,
             ];
             let mut bytes = vec![*choice];

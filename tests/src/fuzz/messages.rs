@@ -58,11 +58,11 @@ pub fn run(bytes: &[u8]) {
 /// Feeds an engine.
 struct Feed<'a>(&'a [u8]);
 
-/// Asserts that what is published is finite.
-struct Finite;
+/// Where estimates go that nobody reads.
+pub(super) struct Nowhere;
 
-impl<E: EstimateMessage> Outbox<E> for Finite {
-    fn publish(&mut self, _estimate: &E) {}
+impl<E: EstimateMessage> Outbox<E> for Nowhere {
+    fn publish(&mut self, _estimate: &mut E) {}
 }
 
 impl Use for Feed<'_> {
@@ -81,19 +81,19 @@ impl Use for Feed<'_> {
             let (rejected, broken) = refused(&engine);
             let left = match kind % 4 {
                 0 => take::<M::Sample>(rest).map(|(sample, left)| {
-                    engine.sample(&sample, 0, &mut Finite);
+                    engine.sample(&sample, 0, &mut Nowhere);
                     left
                 }),
                 1 => take::<PositionFix>(rest).map(|(fix, left)| {
-                    engine.position(&fix, &mut Finite);
+                    engine.position(&fix, &mut Nowhere);
                     left
                 }),
                 2 => take::<VelocityFix>(rest).map(|(fix, left)| {
-                    engine.velocity(&fix, &mut Finite);
+                    engine.velocity(&fix, &mut Nowhere);
                     left
                 }),
                 _ => take::<HeadingFix>(rest).map(|(fix, left)| {
-                    engine.heading(&fix, &mut Finite);
+                    engine.heading(&fix, &mut Nowhere);
                     left
                 }),
             };
@@ -112,7 +112,7 @@ impl Use for Feed<'_> {
         }
         let tally = engine.tally();
         assert_eq!(tally.received.iter().sum::<u64>(), fed);
-        engine.finish(&mut Finite);
+        engine.finish(&mut Nowhere);
         let tally = engine.tally();
         let counters = tally.counters;
         assert_eq!(

@@ -41,12 +41,13 @@ impl<const D: usize> Covariance<D> {
             let root = pivot.sqrt();
             l[j][j] = root;
             for i in j + 1..D {
-                if !(sigma[i] > 0.0) {
+                let scale = sigma[i] * sigma[j];
+                if scale.is_nan() || scale <= 0.0 {
                     continue;
                 }
-                let mut entry = p[(i, j)] / (sigma[i] * sigma[j]);
-                for k in 0..j {
-                    entry -= l[i][k] * l[j][k];
+                let mut entry = p[(i, j)] / scale;
+                for (left, right) in l[i][..j].iter().zip(&l[j][..j]) {
+                    entry -= left * right;
                 }
                 l[i][j] = entry / root;
             }

@@ -1,0 +1,129 @@
+//! A live view of a running daemon: `inekf-client monitor`.
+//!
+//! [`Watcher`] drains health and estimates and keeps a [`Picture`] of the last second, whatever the model; [`text`] puts
+//! a picture in words, [`mod@screen`] on a terminal. The monitor is one more reader: it takes nothing from anybody and
+//! slows nobody.
+
+mod picture;
+#[cfg(feature = "monitor")]
+pub mod screen;
+pub mod text;
+
+use std::time::{Duration, Instant};
+
+use inekf_shared::clock::monotonic_ns;
+use inekf_shared::message::{EstimateSe2, EstimateSe3, EstimateSe23, Health};
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::{self, Node, Subscriber};
+
+pub use picture::{Picture, Quantity};
+
+use crate::model::{Estimate, Model};
+use crate::read::EstimateReader;
+use crate::session::running_model;
+
+/// How often the queues are drained: the reader's buffer holds a second of estimates at 1 kHz.
+pub const POLL: Duration = Duration::from_millis(50);
+/// The length of a picture.
+pub const PERIOD: Duration = Duration::from_secs(1);
+
+/// What is done with each picture; `false` ends the monitor.
+pub type Show<'a> = &'a mut dyn FnMut(&Picture) -> anyhow::Result<bool>;
+
+/// Watches the daemon of `instance` and shows a picture every [`PERIOD`], until `show` or `stop` ends it. `stop` is asked
+/// every [`POLL`].
+///
+/// # Errors
+/// No daemon answers, a port fails, or what `show` returns.
+pub fn monitor(
+    instance: &Instance,
+    stop: &mut dyn FnMut() -> anyhow::Result<bool>,
+    show: Show<'_>,
+) -> anyhow::Result<()> {
+    match running_model(instance)? {
+        Model::Imu => Watcher::<EstimateSe23>::open(instance)?.run(stop, show),
+        Model::Odometry3d => Watcher::<EstimateSe3>::open(instance)?.run(stop, show),
+        Model::Odometry2d => Watcher::<EstimateSe2>::open(instance)?.run(stop, show),
+    }
+}
+
+/// Reads what one daemon says of itself, and its estimates.
+pub struct Watcher<E: Estimate> {
+    estimates: EstimateReader<E>,
+    health: Subscriber<Health>,
+    picture: Picture,
+    _node: Node,
+}
+
+impl<E: Estimate> Watcher<E> {
+    /// A watcher of `instance`.
+    ///
+    /// # Errors
+    /// A port cannot be opened, or the daemon has another model.
+    pub fn open(instance: &Instance) -> anyhow::Result<Self> {
+        Self::open_on(
+            transport::open_node("inekf-monitor")?,
+            EstimateReader::open(instance)?,
+            instance,
+        )
+    }
+
+    /// The same on a node and with a reader of one's own.
+    ///
+    /// # Errors
+    /// As [`Watcher::open`].
+    pub fn open_on(
+        node: Node,
+        estimates: EstimateReader<E>,
+        instance: &Instance,
+    ) -> anyhow::Result<Self> {
+        Ok(Self {
+            health: transport::health(&node, instance)?.subscriber()?,
+            estimates,
+            picture: Picture::new(instance.as_str(), E::KIND)?,
+            _node: node,
+        })
+    }
+
+    /// Takes what has come.
+    ///
+    /// # Errors
+    /// A port fails.
+    pub fn drain(&mut self) -> anyhow::Result<()> {
+        while let Some(health) = self.health.receive()? {
+            self.picture.take_health(&health);
+        }
+        while let Some(estimate) = self.estimates.next_estimate()? {
+            self.picture.take_estimate(&estimate);
+        }
+        Ok(())
+    }
+
+    /// The picture of the time since the last one, which took `elapsed`.
+    pub fn picture(&mut self, elapsed: Duration) -> &Picture {
+        let missed = self.estimates.missed();
+        self.picture.finish(monotonic_ns(), elapsed, missed);
+        &self.picture
+    }
+
+    fn run(
+        mut self,
+        stop: &mut dyn FnMut() -> anyhow::Result<bool>,
+        show: Show<'_>,
+    ) -> anyhow::Result<()> {
+        let mut last = Instant::now();
+        while !stop()? {
+            self.drain()?;
+            if last.elapsed() >= PERIOD {
+                let elapsed = last.elapsed();
+                last = Instant::now();
+                if !show(self.picture(elapsed))? {
+                    return Ok(());
+                }
+                self.picture.begin();
+            }
+            std::thread::sleep(POLL);
+        }
+        Ok(())
+    }
+}

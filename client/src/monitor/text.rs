@@ -1,0 +1,178 @@
+//! A picture in words: one line for logs and pipes, and the lines of each panel of the screen.
+
+use inekf_shared::message::{
+    STATE_ALIGNING, STATE_WAITING, input_name, reason_name, state_name, waiting_for_name,
+};
+
+use super::Picture;
+use crate::plot::format_ns;
+
+/// One line: state, rates, age, position with one sigma, heading, NIS, counters, latency.
+#[must_use]
+pub fn line(picture: &Picture) -> String {
+    let mut parts = vec![state(picture), rates(picture)];
+    if let Some(position) = picture.position() {
+        let [x, y, z] = position.mean;
+        parts.push(format!("position {x:.3} {y:.3} {z:.3} m"));
+        if let Some([sx, sy, sz]) = position.sigma {
+            parts.push(format!("sigma {sx:.3} {sy:.3} {sz:.3} m"));
+        }
+    }
+    if let Some(pose) = picture.pose {
+        parts.push(format!(
+            "heading {:.2} deg",
+            pose.heading_rad().to_degrees()
+        ));
+    }
+    for (source, nis) in picture.nis() {
+        parts.push(format!("nis[{source}] {nis:.2}"));
+    }
+    parts.push(fixes(picture));
+    if !picture.latency.is_empty() {
+        parts.push(latency(picture));
+    }
+    parts.retain(|part| !part.is_empty());
+    parts.join(", ")
+}
+
+/// The daemon's state, and what it waits for.
+#[must_use]
+pub fn state(picture: &Picture) -> String {
+    let Some(health) = picture.health else {
+        return "no word of the daemon yet".to_owned();
+    };
+    let mut text = state_name(health.state).to_owned();
+    if matches!(health.state, STATE_WAITING | STATE_ALIGNING) {
+        text += &format!(" for {}", waiting_for_name(health.waiting_for));
+    }
+    if let Some(age_ns) = picture.health_age_ns.filter(|age| *age > 5_000_000_000) {
+        text += &format!(" {} ago, silent since", format_ns(age_ns as f64));
+    }
+    text
+}
+
+/// Rates of samples and estimates, and the age of the last estimate.
+#[must_use]
+pub fn rates(picture: &Picture) -> String {
+    let samples = picture.health.map_or(0.0, |health| health.imu_rate_hz);
+    let mut text = format!(
+        "samples {samples:.1} Hz, estimates {:.1} Hz",
+        picture.estimate_rate_hz
+    );
+    if let Some(age_ns) = picture.estimate_age_ns {
+        text += &format!(", age {}", format_ns(age_ns as f64));
+    }
+    if picture.missed > 0 {
+        text += &format!(", {} missed here", picture.missed);
+    }
+    text
+}
+
+/// What became of the fixes, as the last health message has it.
+#[must_use]
+pub fn fixes(picture: &Picture) -> String {
+    let Some(health) = picture.health else {
+        return String::new();
+    };
+    let counters = health.counters;
+    format!(
+        "accepted {} gated {} late {} lost {} rejected {}",
+        counters.accepted, counters.gated, counters.late, counters.lost, counters.rejected
+    )
+}
+
+/// From the sending of a sample to its estimate's publication.
+#[must_use]
+pub fn latency(picture: &Picture) -> String {
+    let at = |quantile| format_ns(picture.latency.value_at_quantile(quantile) as f64);
+    format!(
+        "latency p50 {} p99 {} max {}",
+        at(0.5),
+        at(0.99),
+        format_ns(picture.latency.max() as f64)
+    )
+}
+
+/// The state: a line a quantity, with one sigma where it is known.
+#[must_use]
+pub fn estimate(picture: &Picture) -> Vec<String> {
+    let Some(pose) = picture.pose else {
+        return vec!["no estimate yet".to_owned()];
+    };
+    let mut lines = Vec::new();
+    let vector = |name: &str, [x, y, z]: [f64; 3], unit: &str| {
+        format!("{name:<10} {x:>11.4} {y:>11.4} {z:>11.4} {unit}")
+    };
+    lines.push(vector("position", pose.p_w_m.into(), "m"));
+    if let Some(sigma) = picture.deviations {
+        lines.push(vector("  sigma", sigma.position_m.into(), "m"));
+    }
+    if let Some(v_w_mps) = pose.v_w_mps {
+        lines.push(vector("velocity", v_w_mps.into(), "m/s"));
+    }
+    let (roll, pitch, yaw) = pose.q_wb.euler_angles();
+    let degrees = [roll, pitch, yaw].map(f64::to_degrees);
+    lines.push(vector("roll pitch yaw", degrees, "deg").replacen(
+        "roll pitch yaw",
+        "attitude  ",
+        1,
+    ));
+    if let Some(sigma) = picture.deviations {
+        let sigma_deg = sigma.heading_rad.to_degrees();
+        lines.push(format!(
+            "{:<10} {:>11} {:>11} {sigma_deg:>11.4} deg",
+            "  sigma", "", ""
+        ));
+    }
+    if let Some([gyro, accel]) = picture.biases {
+        lines.push(vector("gyro bias", gyro, "rad/s"));
+        lines.push(vector("accel bias", accel, "m/s^2"));
+    }
+    lines
+}
+
+/// Fixes: counters, and the last NIS of each position source.
+#[must_use]
+pub fn updates(picture: &Picture) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(health) = picture.health {
+        let counters = health.counters;
+        for (name, count) in [
+            ("accepted", counters.accepted),
+            ("gated", counters.gated),
+            ("late", counters.late),
+            ("lost", counters.lost),
+            ("rejected", counters.rejected),
+        ] {
+            lines.push(format!("{name:<10} {count:>10}"));
+        }
+        for (code, count) in (0_u32..).zip(health.rejected_by_reason) {
+            if count > 0 {
+                lines.push(format!("  {count} {}", reason_name(code)));
+            }
+        }
+    }
+    for (source, nis) in picture.nis() {
+        lines.push(format!("NIS of {source}   {nis:>10.2}"));
+    }
+    lines
+}
+
+/// Messages by input since the daemon's start, and the rates.
+#[must_use]
+pub fn inputs(picture: &Picture) -> Vec<String> {
+    let mut lines: Vec<String> = rates(picture).split(", ").map(str::to_owned).collect();
+    if let Some(health) = picture.health {
+        for (input, count) in health.received.iter().enumerate() {
+            if *count > 0 {
+                lines.push(format!("{:<10} {count:>10}", input_name(input)));
+            }
+        }
+        lines.push(format!(
+            "up {} s, process {}",
+            health.uptime_ns / 1_000_000_000,
+            health.instance_pid
+        ));
+    }
+    lines
+}

@@ -2,7 +2,8 @@
 
 use inekf::filter::{Covariance, Verdict};
 use inekf_shared::message::{
-    ESTIMATE_DEGRADED, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED, ESTIMATE_RESET, ESTIMATE_UPDATED,
+    ESTIMATE_DEGRADED, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED, ESTIMATE_RESET, ESTIMATE_SMOOTHED,
+    ESTIMATE_UPDATED,
     EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL, STATE_DEGRADED, STATE_RUNNING,
 };
 use nalgebra::Vector3;
@@ -122,6 +123,11 @@ impl<E: EstimateMessage> Output<E> {
                 };
                 self.publish(model, *stamp_ns, state, flags, fix.source, outbox);
             }
+            Event::Smoothed {
+                stamp_ns,
+                state,
+                source,
+            } => self.publish(model, *stamp_ns, state, ESTIMATE_SMOOTHED, *source, outbox),
         }
     }
 

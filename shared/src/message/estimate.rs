@@ -21,9 +21,16 @@ pub const ESTIMATE_RESET: u32 = 4;
 pub const ESTIMATE_DEGRADED: u32 = 8;
 /// Flag: a late fix was fused by replaying the samples since.
 pub const ESTIMATE_REPLAYED: u32 = 16;
+/// Flag: the window of a smoother has seen all fixes so far, and this estimate comes from it; the estimate before it has
+/// the same stamp.
+pub const ESTIMATE_SMOOTHED: u32 = 32;
 /// Every flag that is defined.
-pub const ESTIMATE_FLAGS: u32 =
-    ESTIMATE_PROPAGATED | ESTIMATE_UPDATED | ESTIMATE_RESET | ESTIMATE_DEGRADED | ESTIMATE_REPLAYED;
+pub const ESTIMATE_FLAGS: u32 = ESTIMATE_PROPAGATED
+    | ESTIMATE_UPDATED
+    | ESTIMATE_RESET
+    | ESTIMATE_DEGRADED
+    | ESTIMATE_REPLAYED
+    | ESTIMATE_SMOOTHED;
 
 /// Model: an IMU drives SE_2(3) with biases ([`EstimateSe23`]).
 pub const MODEL_IMU: u32 = 1;
@@ -47,6 +54,7 @@ pub const fn estimate_flag_name(flag: u32) -> &'static str {
         ESTIMATE_RESET => "reset",
         ESTIMATE_DEGRADED => "degraded",
         ESTIMATE_REPLAYED => "replayed",
+        ESTIMATE_SMOOTHED => "smoothed",
         _ => "unknown",
     }
 }

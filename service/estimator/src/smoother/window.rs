@@ -14,6 +14,10 @@
 //! that is left-invariant to first order, and fixes with equal noise on all axes. Everything else is
 //! linearised anew at each iteration; the window sees by itself which it is.
 //!
+//! An update can be done at once, or in slices between other work; much of the next one can be done before its fix is
+//! there ([`Window::anticipate`]), and then the newest state is smoothed as soon as a filter would correct it. The result
+//! is the same bit for bit.
+//!
 //! All memory is taken at construction. A second fix of one moment is a state of its own, at the end of a
 //! motion of no length: [`Preintegration::new`], pushed as it is.
 
@@ -30,10 +34,12 @@ use crate::smoother::{Gaussian, Jacobians, Preintegration};
 mod fix;
 mod knot;
 mod prior;
+mod solve;
 mod track;
 
 use knot::{Knot, Passage};
 use prior::Prior;
+use solve::{Ahead, Solve};
 use track::Track;
 
 pub use fix::Fix;
@@ -122,6 +128,12 @@ pub struct Window<G, S, const D: usize> {
     anisotropic: usize,
     /// Whether the gains that are stored are those of terms which do not depend on the estimate.
     gains_hold: bool,
+    /// The update that is under way.
+    solve: Option<Solve<D>>,
+    /// What has been done for the next one.
+    ahead: Option<Ahead>,
+    /// Whether the oldest state has been marginalised: it is there to be looked at, until the next one comes.
+    gone: bool,
     side: PhantomData<S>,
 }
 
@@ -140,6 +152,9 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             passages: VecDeque::with_capacity(options.capacity),
             anisotropic: 0,
             gains_hold: false,
+            solve: None,
+            ahead: None,
+            gone: false,
             side: PhantomData,
         };
         window.restart(first);
@@ -161,6 +176,9 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         self.knots.push_back(knot);
         self.passages.push_back(passage);
         self.anisotropic = 0;
+        self.solve = None;
+        self.ahead = None;
+        self.gone = false;
         self.gains_hold = self.is_constant();
     }
 
@@ -173,8 +191,9 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     }
 
     /// Adds the state at the end of `motion`. If the window is full its oldest state leaves first, and its last
-    /// estimate, smoothed by all fixes since, is returned.
+    /// estimate, smoothed by all fixes since, is returned. An update that is under way is finished before.
     pub fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
+        self.finish();
         let newest = self.newest_knot();
         let track = Track::new(&motion.motion().step);
         let (chi, transition, predicted) = if self.is_affine() {
@@ -191,17 +210,31 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             predicted,
         };
         let knot = Knot::new(chi, track, &predicted);
-        let left = self
-            .is_full()
-            .then(|| self.marginalise(&knot, &mut passage));
+        let left = self.is_full().then(|| {
+            if !self.gone {
+                self.marginalise(Some((&knot, &mut passage)));
+                self.ahead = None;
+            }
+            self.pop()
+        });
         self.knots.push_back(knot);
         self.passages.push_back(passage);
-        left
+        left.flatten()
     }
 
-    /// Removes the oldest state; what is known from it becomes the prior of the next one, which is the given one if
-    /// the window is empty then. Gives its estimate.
-    fn marginalise(&mut self, knot: &Knot<G, D>, passage: &mut Passage<G, D>) -> G {
+    /// Forgets the oldest state, which has been marginalised. Gives its estimate.
+    fn pop(&mut self) -> Option<G> {
+        self.gone = false;
+        if let Some(ahead) = &mut self.ahead {
+            ahead.next -= 1;
+        }
+        self.passages.pop_front();
+        self.knots.pop_front().map(|knot| knot.chi)
+    }
+
+    /// Marginalises the oldest state: what is known from it becomes the prior of the next one, which is the `entering`
+    /// one if there is no other.
+    fn marginalise(&mut self, entering: Option<(&Knot<G, D>, &mut Passage<G, D>)>) {
         let (fresh, affine) = (self.must_linearise(), self.is_affine());
         let first = &mut self.knots[0];
         if fresh {
@@ -215,12 +248,11 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         }
         let (left, mean, filtered) = (first.chi, first.correction, first.filtered);
         self.anisotropic -= usize::from(first.fix.is_some_and(|fix| !fix.is_isotropic()));
-        self.knots.pop_front();
-        self.passages.pop_front();
 
-        let (next, passage) = match (self.knots.front(), self.passages.front_mut()) {
-            (Some(next), Some(passage)) => (next, passage),
-            _ => (knot, passage),
+        let (next, passage) = match (self.knots.get(1), self.passages.get_mut(1), entering) {
+            (Some(next), Some(passage), _) => (next, passage),
+            (_, _, Some(entering)) => entering,
+            _ => return,
         };
         let mean = if affine {
             if fresh {
@@ -238,138 +270,6 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             covariance: passage.predicted,
         };
         self.prior = Prior::new::<S>(self.options.prior, &next.chi, &correction);
-        left
-    }
-
-    /// Takes in a fix of the newest state and smooths the window.
-    ///
-    /// # Errors
-    /// [`WindowError`]; the states are then unchanged, as they are when the fix is gated.
-    pub fn update(&mut self, fix: impl Into<Fix>) -> Result<WindowCorrection, WindowError> {
-        let fix = fix.into();
-        let last = self.knots.len() - 1;
-        if self.knots[last].fix.is_some() {
-            return Err(WindowError::AlreadySeen);
-        }
-        self.knots[last].fix = Some(fix);
-        self.anisotropic += usize::from(!fix.is_isotropic());
-        let passage = self.must_linearise().then(|| self.passages[last]);
-        let mut steps = 0;
-        let outcome = self.iterate(&mut steps);
-        if !matches!(outcome, Ok(correction) if correction.verdict == Verdict::Accepted) {
-            self.anisotropic -= usize::from(!fix.is_isotropic());
-            if let Some(passage) = passage {
-                self.passages[last] = passage;
-            }
-            self.knots[last].unsee(&self.passages[last]);
-            if steps > 0 {
-                for knot in &mut self.knots {
-                    knot.chi = knot.before;
-                }
-            }
-        }
-        outcome
-    }
-
-    /// Gauss-Newton; counts the steps that moved the states.
-    fn iterate(&mut self, steps: &mut usize) -> Result<WindowCorrection, WindowError> {
-        let mut correction = WindowCorrection {
-            verdict: Verdict::Accepted,
-            nis: f64::NAN,
-            iterations: self.options.iterations,
-        };
-        while *steps < self.options.iterations {
-            self.forward()?;
-            if *steps == 0 {
-                let newest = self.newest_knot();
-                correction.nis = newest.innovation.dot(&newest.weighted);
-                if !correction.nis.is_finite() {
-                    return Err(WindowError::NotFinite);
-                }
-                if correction.nis > self.options.gate {
-                    correction.verdict = Verdict::Gated;
-                    correction.iterations = 0;
-                    return Ok(correction);
-                }
-            }
-            *steps += 1;
-            self.backward(*steps == 1)?;
-        }
-        Ok(correction)
-    }
-
-    /// The Kalman filter over the linearised window.
-    fn forward(&mut self) -> Result<(), WindowError> {
-        let fresh = self.must_linearise();
-        let constant = self.is_constant();
-        let affine = self.is_affine();
-        let jacobians = self.options.jacobians;
-        let last = self.knots.len() - 1;
-        let mut before: Option<(G, SVector<f64, D>)> = None;
-        let mut filtered = self.knots[0].filtered;
-        let states = self.knots.iter_mut().zip(&mut self.passages);
-        for (index, (knot, passage)) in states.enumerate() {
-            let mean = match &before {
-                None if fresh => {
-                    let prior = self.prior.at::<S>(&knot.chi);
-                    passage.predicted = prior.covariance;
-                    prior.mean
-                }
-                None => self.prior.mean_at::<S>(&knot.chi),
-                Some((chi, correction)) if affine => {
-                    if fresh {
-                        let noise = passage.motion.noise();
-                        passage.predicted = knot.track.carry_covariance(&filtered, noise);
-                    }
-                    knot.track.carry(correction) + knot.offset::<S>(chi)
-                }
-                Some((chi, correction)) => {
-                    let offset = passage.link::<S>(chi, &knot.chi, &filtered, jacobians);
-                    passage.transition * correction + offset
-                }
-            };
-            if fresh || index == last {
-                if !knot.weigh(&passage.predicted) {
-                    self.gains_hold = false;
-                    return Err(WindowError::InnovationNotPositiveDefinite);
-                }
-                filtered = knot.filtered;
-            }
-            knot.correct(mean);
-            before = Some((knot.chi, knot.correction));
-        }
-        self.gains_hold = constant;
-        Ok(())
-    }
-
-    /// The disturbance smoother, and the step of all estimates; the `first` of an update keeps what they were.
-    fn backward(&mut self, first: bool) -> Result<(), WindowError> {
-        let affine = self.is_affine();
-        let mut adjoint = SVector::<f64, D>::zeros();
-        let mut sum = 0.0;
-        for (knot, passage) in self.knots.iter_mut().zip(&self.passages).rev() {
-            let start = knot.smooth(adjoint);
-            sum += knot.correction.sum();
-            adjoint = if affine {
-                knot.track.carry_back(&start)
-            } else {
-                passage.transition.tr_mul(&start)
-            };
-            let xi = if S::IS_LEFT {
-                knot.correction
-            } else {
-                S::from_left(&knot.chi) * knot.correction
-            };
-            if first {
-                knot.before = knot.chi;
-            }
-            knot.chi = S::retract(&knot.chi, &xi);
-        }
-        if sum.is_finite() {
-            Ok(())
-        } else {
-            Err(WindowError::NotFinite)
-        }
     }
 
     /// Whether the linearised motions are the same at all estimates, but for their offsets.

@@ -19,11 +19,29 @@ pub trait AnyWindow<G, const D: usize>: Debug {
     /// [`Window::push`].
     fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G>;
 
-    /// [`Window::update`].
+    /// [`Window::begin`].
     ///
     /// # Errors
     /// As there.
-    fn update(&mut self, fix: Fix) -> Result<WindowCorrection, WindowError>;
+    fn begin(&mut self, fix: Fix) -> Result<(), WindowError>;
+
+    /// [`Window::is_ready_for`].
+    fn is_ready_for(&self, fix: &Fix) -> bool;
+
+    /// [`Window::lead`].
+    fn lead(&mut self) -> Option<Result<WindowCorrection, WindowError>>;
+
+    /// [`Window::anticipate`].
+    fn anticipate(&mut self, budget: &mut i64) -> bool;
+
+    /// [`Window::advance`].
+    fn advance(&mut self, budget: &mut i64) -> Option<Result<WindowCorrection, WindowError>>;
+
+    /// [`Window::work`].
+    fn work(&self) -> i64;
+
+    /// [`Window::work_of_push`].
+    fn work_of_push(&self) -> i64;
 
     /// [`Window::newest`].
     fn newest(&self) -> Belief<G, Left, D>;
@@ -41,8 +59,32 @@ impl<G: InertialState<D>, S: Side, const D: usize> AnyWindow<G, D> for Window<G,
         Self::push(self, motion)
     }
 
-    fn update(&mut self, fix: Fix) -> Result<WindowCorrection, WindowError> {
-        Self::update(self, fix)
+    fn begin(&mut self, fix: Fix) -> Result<(), WindowError> {
+        Self::begin(self, fix)
+    }
+
+    fn is_ready_for(&self, fix: &Fix) -> bool {
+        Self::is_ready_for(self, fix)
+    }
+
+    fn lead(&mut self) -> Option<Result<WindowCorrection, WindowError>> {
+        Self::lead(self)
+    }
+
+    fn anticipate(&mut self, budget: &mut i64) -> bool {
+        Self::anticipate(self, budget)
+    }
+
+    fn advance(&mut self, budget: &mut i64) -> Option<Result<WindowCorrection, WindowError>> {
+        Self::advance(self, budget)
+    }
+
+    fn work(&self) -> i64 {
+        Self::work(self)
+    }
+
+    fn work_of_push(&self) -> i64 {
+        Self::work_of_push(self)
     }
 
     fn newest(&self) -> Belief<G, Left, D> {

@@ -8,7 +8,7 @@ use crate::common::{
 use crate::{Fed, Full, full, smoothing};
 
 /// Units for a state with biases, forward; no piece is larger but a push, which is three.
-const STATE: i64 = 25;
+const STATE: i64 = 14;
 
 fn started(window: usize, more: &str) -> Full {
     let mut engine = full(smoothing("", window, more));

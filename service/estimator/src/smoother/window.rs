@@ -40,7 +40,7 @@ mod track;
 use knot::{Knot, Passage};
 use prior::Prior;
 use solve::{Ahead, Solve};
-use track::Track;
+use track::{InputJacobian, Track};
 
 pub use fix::Fix;
 pub use prior::PriorForm;
@@ -130,7 +130,9 @@ pub struct Window<G, S, const D: usize> {
     gains_hold: bool,
     /// The update that is under way.
     solve: Option<Solve<D>>,
-    /// What has been done for the next one.
+    /// What was predicted for the newest state before that.
+    kept: Covariance<D>,
+    /// What has been done for the next update.
     ahead: Option<Ahead>,
     /// Whether the oldest state has been marginalised: it is there to be looked at, until the next one comes.
     gone: bool,
@@ -153,6 +155,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             anisotropic: 0,
             gains_hold: false,
             solve: None,
+            kept: first.covariance,
             ahead: None,
             gone: false,
             side: PhantomData,
@@ -169,6 +172,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         let passage = Passage {
             motion: Preintegration::new(&first.mean),
             transition: SMatrix::identity(),
+            inputs: InputJacobian::zeros(),
             predicted: first.covariance,
         };
         let track = Track::new(&passage.motion.motion().step);
@@ -195,24 +199,24 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     pub fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
         self.finish();
         let newest = self.newest_knot();
-        let track = Track::new(&motion.motion().step);
-        let (chi, transition, predicted) = if self.is_affine() {
-            let predicted = track.carry_covariance(&newest.filtered, motion.noise());
-            (track.apply(&newest.chi), SMatrix::identity(), predicted)
-        } else {
-            let (chi, transition) = motion.transition(&newest.chi);
-            let carried = newest.filtered.transformed(&transition);
-            (chi, transition, carried.plus(motion.noise().matrix()))
-        };
         let mut passage = Passage {
             motion: *motion,
-            transition,
-            predicted,
+            transition: SMatrix::identity(),
+            inputs: InputJacobian::zeros(),
+            predicted: newest.filtered,
         };
-        let knot = Knot::new(chi, track, &predicted);
+        let track = passage.track(&newest.chi);
+        let chi = track.apply(&newest.chi).normalized();
+        track.carry_covariance(
+            &newest.filtered,
+            motion.noise(),
+            &passage.inputs,
+            &mut passage.predicted,
+        );
+        let mut knot = Knot::new(chi, track, &passage.predicted);
         let left = self.is_full().then(|| {
             if !self.gone {
-                self.marginalise(Some((&knot, &mut passage)));
+                self.marginalise(Some((&mut knot, &mut passage)));
                 self.ahead = None;
             }
             self.pop()
@@ -234,13 +238,14 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// Marginalises the oldest state: what is known from it becomes the prior of the next one, which is the `entering`
     /// one if there is no other.
-    fn marginalise(&mut self, entering: Option<(&Knot<G, D>, &mut Passage<G, D>)>) {
-        let (fresh, affine) = (self.must_linearise(), self.is_affine());
+    fn marginalise(&mut self, entering: Option<(&mut Knot<G, D>, &mut Passage<G, D>)>) {
+        let (fresh, tracked) = (self.must_linearise(), self.is_tracked());
         let first = &mut self.knots[0];
         if fresh {
             let prior = self.prior.at::<S>(&first.chi);
             // It was positive definite at the last update, if there is a fix.
-            first.weigh(&prior.covariance);
+            first.filtered = prior.covariance;
+            first.weigh();
             first.correct(prior.mean);
         } else {
             let wanted = self.prior.mean_at::<S>(&first.chi);
@@ -249,32 +254,48 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         let (left, mean, filtered) = (first.chi, first.correction, first.filtered);
         self.anisotropic -= usize::from(first.fix.is_some_and(|fix| !fix.is_isotropic()));
 
-        let (next, passage) = match (self.knots.get(1), self.passages.get_mut(1), entering) {
+        let (next, passage) = match (self.knots.get_mut(1), self.passages.get_mut(1), entering) {
             (Some(next), Some(passage), _) => (next, passage),
             (_, _, Some(entering)) => entering,
             _ => return,
         };
-        let mean = if affine {
-            if fresh {
-                passage.predicted = next
-                    .track
-                    .carry_covariance(&filtered, passage.motion.noise());
+        let correction = if tracked {
+            if !G::IS_GROUP_AFFINE {
+                next.track = passage.track(&left);
             }
-            next.track.carry(&mean) + next.offset::<S>(&left)
+            if fresh {
+                let Passage {
+                    motion,
+                    inputs,
+                    predicted,
+                    ..
+                } = passage;
+                let noise = motion.noise();
+                next.track
+                    .carry_covariance(&filtered, noise, inputs, predicted);
+            }
+            Gaussian {
+                mean: next.track.carry(&mean, &passage.inputs) + next.offset::<S>(&left),
+                covariance: passage.predicted,
+            }
         } else {
-            let offset = passage.link::<S>(&left, &next.chi, &filtered, self.options.jacobians);
-            passage.transition * mean + offset
-        };
-        let correction = Gaussian {
-            mean,
-            covariance: passage.predicted,
+            let (offset, predicted) = passage.link::<S>(&left, &next.chi, &filtered);
+            Gaussian {
+                mean: passage.transition * mean + offset,
+                covariance: predicted,
+            }
         };
         self.prior = Prior::new::<S>(self.options.prior, &next.chi, &correction);
     }
 
+    /// Whether the Jacobians of the motions' residuals are left out: then the tracks have F.
+    fn is_tracked(&self) -> bool {
+        self.options.jacobians == Jacobians::Frozen
+    }
+
     /// Whether the linearised motions are the same at all estimates, but for their offsets.
     fn is_affine(&self) -> bool {
-        G::IS_GROUP_AFFINE && S::Residual::IS_LEFT && self.options.jacobians == Jacobians::Frozen
+        G::IS_GROUP_AFFINE && S::Residual::IS_LEFT && self.is_tracked()
     }
 
     /// Whether nothing that enters the covariances depends on the estimates.
@@ -325,8 +346,8 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         let later = self.knots.range(index + 1..);
         for (later, passage) in later.zip(self.passages.range(index + 1..)).rev() {
             let start = later.information(&information);
-            let transition = if self.is_affine() {
-                later.track.matrix()
+            let transition = if self.is_tracked() {
+                later.track.matrix(&passage.inputs)
             } else {
                 passage.transition
             };

@@ -4,8 +4,10 @@
 //! estimate, lever arm or not: `H = [-hat(b), 0, I]` for a position at the point b of the body, `[0, I, 0]` for a
 //! velocity. With equal noise on all axes its covariance does not either, and then the gains are constants.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, SMatrix, SVector, Vector3};
 
+use crate::columns::combined;
+use crate::filter::Covariance;
 use crate::lie::hat;
 use crate::model::{InertialState, PositionObservation, VelocityObservation};
 
@@ -84,6 +86,19 @@ impl Fix {
             h.fixed_view_mut::<3, 3>(0, 0).copy_from(&-hat(arm_b));
         }
         h
+    }
+
+    /// `P H^T`, D x 3.
+    pub(super) fn covariance_with<const D: usize>(&self, p: &Covariance<D>) -> SMatrix<f64, D, 3> {
+        let columns = &p.matrix().data.0;
+        let (start, arm_b) = self.place();
+        let b = arm_b.copied().unwrap_or_default();
+        let product = [
+            combined::<D, D, D, D, 2>(&columns[start], [b.z, -b.y], [&columns[1], &columns[2]]),
+            combined::<D, D, D, D, 2>(&columns[start + 1], [b.x, -b.z], [&columns[2], &columns[0]]),
+            combined::<D, D, D, D, 2>(&columns[start + 2], [b.y, -b.x], [&columns[0], &columns[1]]),
+        ];
+        SMatrix::from_array_storage(ArrayStorage(product))
     }
 
     /// `H xi`.

@@ -8,11 +8,11 @@
 //! A fix has a say in the forward pass at the newest state only. All before that, and the marginalisation of the state
 //! that will leave, is known as soon as the update before is done: [`Window::anticipate`] does it.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SVector;
 
-use super::knot::Knot;
+use super::knot::{Knot, Passage};
 use super::{Fix, Window, WindowCorrection, WindowError};
-use crate::filter::{Covariance, Side, Verdict};
+use crate::filter::{Side, Verdict};
 use crate::model::InertialState;
 
 /// Units of work: about a tenth of a microsecond each on a processor of 2020.
@@ -21,9 +21,9 @@ mod work {
     pub const VECTORS: i64 = 1;
 
     /// One state forward with its gain and covariance, about as the product of matrices of dimension D.
-    pub const fn matrices(dimension: usize, affine: bool) -> i64 {
+    pub const fn matrices(dimension: usize, tracked: bool) -> i64 {
         let cube = (dimension * dimension * dimension) as i64;
-        1 + cube / if affine { 200 } else { 140 }
+        1 + cube / if tracked { 250 } else { 140 }
     }
 }
 
@@ -34,9 +34,6 @@ pub(super) struct Solve<const D: usize> {
     steps: usize,
     pass: Pass<D>,
     correction: WindowCorrection,
-    /// Of the newest state before the update.
-    transition: SMatrix<f64, D, D>,
-    predicted: Covariance<D>,
 }
 
 /// How far the forward pass of an update has come whose fix is not there yet.
@@ -101,9 +98,8 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
                 nis: f64::NAN,
                 iterations: self.options.iterations,
             },
-            transition: self.passages[last].transition,
-            predicted: self.passages[last].predicted,
         });
+        self.kept = self.passages[last].predicted;
         Ok(())
     }
 
@@ -172,7 +168,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         match outcome {
             None => self.solve = Some(solve),
             Some(Ok(correction)) if correction.verdict == Verdict::Accepted => {}
-            Some(_) => self.take_back(&solve),
+            Some(_) => self.take_back(solve.steps),
         }
         outcome
     }
@@ -197,12 +193,12 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// The units of work of a push.
     pub fn work_of_push(&self) -> i64 {
-        3 * work::matrices(D, self.is_affine())
+        3 * work::matrices(D, self.is_tracked())
     }
 
     fn work_forward(&self) -> i64 {
         if self.must_linearise() {
-            work::matrices(D, self.is_affine())
+            work::matrices(D, self.is_tracked())
         } else {
             work::VECTORS
         }
@@ -216,16 +212,15 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         }
     }
 
-    fn take_back(&mut self, solve: &Solve<D>) {
+    /// Undoes an update of so many steps.
+    fn take_back(&mut self, steps: usize) {
         let last = self.knots.len() - 1;
-        let passage = &mut self.passages[last];
-        passage.transition = solve.transition;
-        passage.predicted = solve.predicted;
+        self.passages[last].predicted = self.kept;
         if let Some(fix) = &self.knots[last].fix {
             self.anisotropic -= usize::from(!fix.is_isotropic());
         }
         self.knots[last].unsee(&self.passages[last]);
-        if solve.steps > 0 {
+        if steps > 0 {
             for knot in &mut self.knots {
                 knot.chi = knot.before;
             }
@@ -283,53 +278,59 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     fn forward(&mut self, next: &mut usize, budget: &mut i64) -> Result<bool, WindowError> {
         let fresh = self.must_linearise();
         let constant = self.is_constant();
-        let affine = self.is_affine();
-        let jacobians = self.options.jacobians;
+        let tracked = self.is_tracked();
         let cost = self.work_forward();
         let first = usize::from(self.gone);
         let last = self.knots.len() - 1;
-        let mut before: Option<(G, SVector<f64, D>)> = None;
-        let mut filtered = self.knots[first].filtered;
+        let from = (*next).max(first + 1) - 1;
+        let mut states = self.knots.iter_mut().zip(&mut self.passages).skip(from);
+        let mut before: Option<&Knot<G, D>> = None;
         if *next > first {
-            let knot = &self.knots[*next - 1];
-            before = Some((knot.chi, knot.correction));
-            filtered = knot.filtered;
+            before = states.next().map(|(knot, _)| &*knot);
         }
-        let states = self.knots.iter_mut().zip(&mut self.passages);
-        for (index, (knot, passage)) in states.enumerate().skip(*next) {
+        for (index, (knot, passage)) in (*next..).zip(states) {
             if *budget <= 0 {
                 *next = index;
                 return Ok(false);
             }
             *budget -= cost;
-            let mean = match &before {
+            let mean = match before {
                 None if fresh => {
                     let prior = self.prior.at::<S>(&knot.chi);
-                    passage.predicted = prior.covariance;
+                    knot.filtered = prior.covariance;
                     prior.mean
                 }
                 None => self.prior.mean_at::<S>(&knot.chi),
-                Some((chi, correction)) if affine => {
-                    if fresh {
-                        let noise = passage.motion.noise();
-                        passage.predicted = knot.track.carry_covariance(&filtered, noise);
+                Some(before) if tracked => {
+                    if !G::IS_GROUP_AFFINE {
+                        knot.track = passage.track(&before.chi);
                     }
-                    knot.track.carry(correction) + knot.offset::<S>(chi)
+                    let Passage { motion, inputs, .. } = &*passage;
+                    if fresh {
+                        let (p, q) = (&before.filtered, motion.noise());
+                        let track = &knot.track;
+                        track.carry_covariance(p, q, inputs, &mut knot.filtered);
+                    }
+                    knot.track.carry(&before.correction, inputs) + knot.offset::<S>(&before.chi)
                 }
-                Some((chi, correction)) => {
-                    let offset = passage.link::<S>(chi, &knot.chi, &filtered, jacobians);
-                    passage.transition * correction + offset
+                Some(before) => {
+                    let (offset, predicted) =
+                        passage.link::<S>(&before.chi, &knot.chi, &before.filtered);
+                    knot.filtered = predicted;
+                    passage.transition * before.correction + offset
                 }
             };
-            if fresh || index == last {
-                if !knot.weigh(&passage.predicted) {
-                    self.gains_hold = false;
-                    return Err(WindowError::InnovationNotPositiveDefinite);
-                }
-                filtered = knot.filtered;
+            if fresh && (constant || index == last) {
+                passage.predicted = knot.filtered;
+            } else if index == last {
+                knot.filtered = passage.predicted;
+            }
+            if (fresh || index == last) && !knot.weigh() {
+                self.gains_hold = false;
+                return Err(WindowError::InnovationNotPositiveDefinite);
             }
             knot.correct(mean);
-            before = Some((knot.chi, knot.correction));
+            before = Some(knot);
         }
         self.gains_hold = constant;
         *next = last + 1;
@@ -346,7 +347,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         first: bool,
         budget: &mut i64,
     ) -> bool {
-        let affine = self.is_affine();
+        let tracked = self.is_tracked();
         let cost = self.work_back();
         let states = self.knots.range_mut(..*end).zip(self.passages.range(..*end));
         for (knot, passage) in states.rev() {
@@ -357,8 +358,8 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             *end -= 1;
             let start = knot.smooth(*adjoint);
             *sum += knot.correction.sum();
-            *adjoint = if affine {
-                knot.track.carry_back(&start)
+            *adjoint = if tracked {
+                knot.track.carry_back(&start, &passage.inputs)
             } else {
                 passage.transition.tr_mul(&start)
             };

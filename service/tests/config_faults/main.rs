@@ -615,7 +615,7 @@ fn files_that_cannot_be_read_say_why() {
 #[test]
 fn each_fault_about_the_smoother() {
     let smoother = "estimator = \"smoother\"";
-    let cases: [(&str, &str, &str, &[&str]); 8] = [
+    let cases: [(&str, &str, &str, &[&str]); 7] = [
         (
             smoother,
             "[smoother]\nwindow = 0",
@@ -651,12 +651,6 @@ fn each_fault_about_the_smoother() {
             "[update]\ntransport = \"none\"",
             "update.transport",
             &["[smoother] iterations"],
-        ),
-        (
-            smoother,
-            "[[heading_source]]\nid = 0",
-            "heading_source",
-            &["position and velocity only"],
         ),
         (
             "estimator = \"smoother\"\nmismatch = \"consider\"",

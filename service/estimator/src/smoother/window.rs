@@ -11,7 +11,7 @@
 //! the covariance is the left-invariant Kalman filter's: one covariance step for each new state, and a few
 //! matrix-vector products for each state of the window and iteration. That holds for a state without biases, with
 //! a prior of frozen covariance ([`PriorForm`]), the Jacobian of the motion's residual left out, a parametrisation
-//! that is left-invariant to first order, and fixes with equal noise on all axes. Everything else is
+//! that is left-invariant to first order, and fixes of position and velocity with equal noise on all axes. Everything else is
 //! linearised anew at each iteration; the window sees by itself which it is.
 //!
 //! An update can be done at once, or in slices between other work; much of the next one can be done before its fix is
@@ -81,7 +81,8 @@ impl WindowOptions {
 pub struct WindowCorrection {
     /// Whether the fix was used.
     pub verdict: Verdict,
-    /// Normalised innovation squared of the new fix given all before it: chi-square with 3 degrees of freedom.
+    /// Normalised innovation squared of the new fix given all before it: chi-square with 3 degrees of
+    /// freedom, 1 for a heading.
     pub nis: f64,
     /// Gauss-Newton iterations done.
     pub iterations: usize,

@@ -2,7 +2,7 @@
 
 use inekf::filter::{Gtsam, Left, Side};
 use inekf::lie::SE23;
-use inekf::model::{InertialState, NavState, PositionObservation};
+use inekf::model::{HeadingObservation, InertialState, NavState, PositionObservation};
 use inekf::smoother::{Fix, Jacobians, PriorForm, Window, WindowOptions};
 use nalgebra::Matrix3;
 
@@ -18,11 +18,18 @@ fn assert_slices_change_no_bit<G: InertialState<D>, S: Side, const D: usize>(
     let (mut whole, mut sliced) = (windows(), windows());
     let mut ready = 0;
     for (k, (motion, fix)) in drive.seconds.iter().enumerate() {
-        let fix: Fix = PositionObservation {
+        let mut fix: Fix = PositionObservation {
             covariance_w: covariance_of(k),
             ..*fix
         }
         .into();
+        if k % 11 == 7 {
+            fix = HeadingObservation {
+                heading: k as f64 * 0.1,
+                sigma: 0.5,
+            }
+            .into();
+        }
         let was_ready = sliced.is_ready_for(&fix);
         assert_eq!(sliced.push(motion), whole.push(motion));
         let expected = whole.update(fix);

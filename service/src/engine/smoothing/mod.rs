@@ -118,9 +118,7 @@ impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
         model: &Inertial<G, Left, D>,
         fix: &Fix<Aiding>,
     ) -> Result<Fused, UpdateError> {
-        let Some(seen) = fix.measurement.for_window() else {
-            return Err(UpdateError::NotFinite);
-        };
+        let seen = fix.measurement.for_window();
         if self.behind.is_full() {
             self.catch_up(model);
         }

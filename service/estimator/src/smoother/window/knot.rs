@@ -5,6 +5,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::Fix;
+use super::fix::HeadingRow;
 use super::track::{InputJacobian, Track};
 use crate::filter::{Covariance, Side};
 use crate::model::InertialState;
@@ -18,6 +19,8 @@ pub(super) struct FixGain<const D: usize> {
     pub gain: SMatrix<f64, D, 3>,
     /// Inverse of the innovation covariance.
     pub weight: Matrix3<f64>,
+    /// What depends on the estimate in H.
+    pub row: HeadingRow,
 }
 
 /// How a state was reached: what is read only where gains are computed.
@@ -129,19 +132,20 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
             return true;
         };
         let noise = fix.covariance_b(&self.chi);
-        let h = fix.jacobian();
-        let p_ht = fix.covariance_with(&self.filtered);
+        let row = fix.heading_row(&self.chi);
+        let h = fix.jacobian(&row);
+        let p_ht = fix.covariance_with(&self.filtered, &row);
         let mut innovation = noise;
         for axis in 0..3 {
-            innovation +=
-                fix.seen(&p_ht.column(axis).into_owned()) * Vector3::ith(axis, 1.0).transpose();
+            let seen = fix.seen(&p_ht.column(axis).into_owned(), &row);
+            innovation += seen * Vector3::ith(axis, 1.0).transpose();
         }
         let Some(weight) = inverse(&innovation) else {
             return false;
         };
         let gain = p_ht * weight;
         self.filtered = self.filtered.corrected_with(&p_ht, &gain, &h, &noise);
-        self.gain = Some(FixGain { gain, weight });
+        self.gain = Some(FixGain { gain, weight, row });
         true
     }
 
@@ -149,7 +153,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     pub fn correct(&mut self, predicted: SVector<f64, D>) {
         self.correction = predicted;
         if let (Some(fix), Some(gain)) = (&self.fix, &self.gain) {
-            self.innovation = fix.residual_b(&self.chi) - fix.seen(&predicted);
+            self.innovation = fix.residual_b(&self.chi) - fix.seen(&predicted, &gain.row);
             self.weighted = gain.weight * self.innovation;
             self.correction += gain.gain * self.innovation;
         }
@@ -161,7 +165,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         match (&self.fix, &self.gain) {
             (Some(fix), Some(gain)) => {
                 let weight = self.weighted - gain.gain.tr_mul(&adjoint);
-                fix.add_transposed(adjoint, &weight)
+                fix.add_transposed(adjoint, &weight, &gain.row)
             }
             _ => adjoint,
         }
@@ -171,7 +175,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     pub fn information(&self, end: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
         match (&self.fix, &self.gain) {
             (Some(fix), Some(gain)) => {
-                let h = fix.jacobian::<D>();
+                let h = fix.jacobian::<D>(&gain.row);
                 let rest = SMatrix::identity() - gain.gain * h;
                 rest.transpose() * end * rest + h.transpose() * gain.weight * h
             }

@@ -3,8 +3,8 @@
 use inekf::filter::{Covariance, Verdict};
 use inekf_shared::message::{
     ESTIMATE_DEGRADED, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED, ESTIMATE_RESET, ESTIMATE_SMOOTHED,
-    ESTIMATE_UPDATED,
-    EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL, STATE_DEGRADED, STATE_RUNNING,
+    ESTIMATE_UPDATED, EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL, STATE_DEGRADED,
+    STATE_RUNNING,
 };
 use nalgebra::Vector3;
 

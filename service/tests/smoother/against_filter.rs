@@ -118,5 +118,8 @@ fn headings_are_taken_as_the_plain_filter_takes_them() {
     assert!(difference(&smoothed, &filtered) < ROUNDING);
     assert_eq!(smoother.tally().counters, filter.tally().counters);
     let without = full(smoothing("", 1, "")).run(&circle(10));
-    assert!(difference(&without, &filtered) > 1e-6, "the headings have a say");
+    assert!(
+        difference(&without, &filtered) > 1e-6,
+        "the headings have a say"
+    );
 }

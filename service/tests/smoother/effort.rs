@@ -2,9 +2,7 @@
 
 use inekf_shared::message::{ESTIMATE_SMOOTHED, ESTIMATE_UPDATED, EstimateSe23};
 
-use crate::common::{
-    Input, belief_bits, lively_imu, position, stamp, state_on_circle, velocity,
-};
+use crate::common::{Input, belief_bits, lively_imu, position, stamp, state_on_circle, velocity};
 use crate::{Fed, Full, full, smoothing};
 
 /// Units for a state with biases, forward; no piece is larger but a push, which is three.
@@ -99,8 +97,14 @@ fn looking_at_the_window_changes_no_estimate() {
                 assert!(engine.smoothed(&mut |_| ()).is_ok());
             }
         }
-        assert!(unseen.iter().map(belief_bits).eq(seen.iter().map(belief_bits)));
-        let flags = |rows: &[EstimateSe23]| rows.iter().map(|row| row.head.flags).collect::<Vec<_>>();
+        assert!(
+            unseen
+                .iter()
+                .map(belief_bits)
+                .eq(seen.iter().map(belief_bits))
+        );
+        let flags =
+            |rows: &[EstimateSe23]| rows.iter().map(|row| row.head.flags).collect::<Vec<_>>();
         assert_eq!(flags(&unseen), flags(&seen));
     }
 }

@@ -5,9 +5,7 @@ use std::path::Path;
 
 use inekf_service::config::Config;
 use inekf_service::engine::Settings;
-use inekf_shared::message::{
-    ESTIMATE_SMOOTHED, ESTIMATE_UPDATED, Header, ImuSample, PositionFix,
-};
+use inekf_shared::message::{ESTIMATE_SMOOTHED, ESTIMATE_UPDATED, Header, ImuSample, PositionFix};
 
 use crate::{Fed, Plain, common::Input, common::isotropic, plain, rows};
 
@@ -150,9 +148,17 @@ fn assert_golden_before_the_next_fix(name: &str, mut engine: Plain) {
         engine.feed(&input, &mut published);
     }
     assert_newest(&mut engine);
-    let with = |flag| published.iter().filter(move |row| row.head.flags & flag != 0);
+    let with = |flag| {
+        published
+            .iter()
+            .filter(move |row| row.head.flags & flag != 0)
+    };
     assert_eq!(with(ESTIMATE_UPDATED).count(), 40);
-    assert_eq!(with(ESTIMATE_SMOOTHED).count(), 39, "the last one has no time left");
+    assert_eq!(
+        with(ESTIMATE_SMOOTHED).count(),
+        39,
+        "the last one has no time left"
+    );
     assert_eq!((engine.effort().early, engine.effort().forced), (0, 0));
 }
 

@@ -33,11 +33,13 @@ use crate::smoother::{Gaussian, Jacobians, Preintegration};
 
 mod fix;
 mod knot;
+mod marginal;
 mod prior;
 mod solve;
 mod track;
 
 use knot::{Knot, Passage};
+use marginal::Cover;
 use prior::Prior;
 use solve::{Ahead, Solve};
 use track::{InputJacobian, Track};
@@ -135,6 +137,8 @@ pub struct Window<G, S, const D: usize> {
     kept: Covariance<D>,
     /// What has been done for the next update.
     ahead: Option<Ahead>,
+    /// How far the covariance of the oldest state has come.
+    cover: Cover<D>,
     /// Whether the oldest state has been marginalised: it is there to be looked at, until the next one comes.
     gone: bool,
     side: PhantomData<S>,
@@ -158,6 +162,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             solve: None,
             kept: first.covariance,
             ahead: None,
+            cover: Cover::default(),
             gone: false,
             side: PhantomData,
         };
@@ -183,6 +188,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         self.anisotropic = 0;
         self.solve = None;
         self.ahead = None;
+        self.cover = Cover::default();
         self.gone = false;
         self.gains_hold = self.is_constant();
     }
@@ -224,6 +230,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         });
         self.knots.push_back(knot);
         self.passages.push_back(passage);
+        self.cover = Cover::default();
         left.flatten()
     }
 
@@ -337,25 +344,5 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     /// Whether the next push makes the oldest state leave.
     pub fn is_full(&self) -> bool {
         self.knots.len() >= self.options.capacity
-    }
-
-    /// State `index`, oldest 0, with the covariance of its left-invariant error given all fixes, before and
-    /// after; `None` beyond the newest. Matrix products for each later state: for reports, not for each sample.
-    pub fn smoothed(&self, index: usize) -> Option<Belief<G, Left, D>> {
-        let knot = self.knots.get(index)?;
-        let mut information = SMatrix::<f64, D, D>::zeros();
-        let later = self.knots.range(index + 1..);
-        for (later, passage) in later.zip(self.passages.range(index + 1..)).rev() {
-            let start = later.information(&information);
-            let transition = if self.is_tracked() {
-                later.track.matrix(&passage.inputs)
-            } else {
-                passage.transition
-            };
-            information = transition.tr_mul(&start) * transition;
-        }
-        let p = knot.filtered.matrix();
-        let covariance = Covariance::from_upper(p - p * information * p);
-        Some(Belief::new(knot.chi, covariance))
     }
 }

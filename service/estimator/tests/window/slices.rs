@@ -51,6 +51,11 @@ fn assert_slices_change_no_bit<G: InertialState<D>, S: Side, const D: usize>(
         }
         assert_eq!(actual, Some(expected));
         assert!(whole.states().eq(sliced.states()), "fix {k}");
+        let mut share = 40;
+        while !sliced.cover_oldest(&mut share) {
+            share = 40;
+        }
+        assert_eq!(Some(sliced.oldest()), whole.smoothed(0));
         // Sometimes all, sometimes nothing, sometimes a part.
         let mut rest = [i64::MAX, i64::MAX, 0, 25][k % 4];
         let done = sliced.anticipate(&mut rest);

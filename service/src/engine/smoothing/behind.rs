@@ -16,10 +16,11 @@
 
 use std::collections::VecDeque;
 
-use inekf::filter::{Belief, Left};
+use inekf::filter::{Belief, Covariance, Left};
 use inekf::model::InertialState;
 use inekf::smoother::{self, Preintegration, WindowError};
 use inekf_shared::message::SmoothedState;
+use nalgebra::SVector;
 
 use super::super::history::MAX_FIXES;
 use super::super::inertial::Inertial;
@@ -103,6 +104,8 @@ pub(super) struct Behind<G, const D: usize> {
     ready: Ready<G, D>,
     pace: Pace,
     left: LeftStates,
+    /// Of the states in the window, while they are handed over.
+    covariances: Vec<Covariance<D>>,
     effort: Effort,
 }
 
@@ -124,6 +127,7 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
             ready: Ready::at(&Stand::new(0, &window::nowhere())),
             pace: Pace::default(),
             left: LeftStates::new(capacity + MAX_FIXES),
+            covariances: Vec::with_capacity(capacity),
             effort: Effort::default(),
         }
     }
@@ -142,16 +146,18 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
         // Half an update leaves the states on their way; without a fix that waits there is nothing else.
         let mut rest = i64::MAX;
         self.window.advance(&mut rest);
+        self.find_covariances();
         let Self {
             window,
             stamps,
             left,
+            covariances,
             ..
         } = self;
-        let mut states = stamps.iter();
+        let mut states = stamps.iter().zip(covariances.iter());
         window.each(&mut |chi| {
-            if let Some(&stamp_ns) = states.next() {
-                left.cut(stamp_ns, chi);
+            if let Some((&stamp_ns, covariance)) = states.next() {
+                left.cut(stamp_ns, chi, covariance);
             }
         });
         stamps.clear();
@@ -199,7 +205,11 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
         seen: smoother::Fix,
     ) -> Result<Belief<G, Left, D>, WindowError> {
         let stamp_ns = stand.stamp_ns;
-        let step = if self.iterations > 1 { Stand::<G, D>::WORK } else { 0 };
+        let step = if self.iterations > 1 {
+            Stand::<G, D>::WORK
+        } else {
+            0
+        };
         self.pace.fix(self.window.work(), step);
         self.push(stamp_ns, &stand.motion);
         self.phase = Phase::Solving;
@@ -289,19 +299,38 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
     }
 
     /// Hands over the states in the window, oldest first.
-    pub fn each(&self, give: &mut dyn FnMut(&SmoothedState)) -> usize {
+    pub fn each(&mut self, give: &mut dyn FnMut(&SmoothedState)) -> usize {
+        self.find_covariances();
         let count = self.stamps.len();
-        let mut states = self.stamps.iter().enumerate();
+        let mut states = self.stamps.iter().zip(&self.covariances).enumerate();
         self.window.each(&mut |chi| {
-            if let Some((index, &stamp_ns)) = states.next() {
+            if let Some((index, (&stamp_ns, covariance))) = states.next() {
                 give(&SmoothedState {
                     index: index as u64,
                     count: count as u64,
-                    ..left::message(stamp_ns, chi)
+                    ..left::message(stamp_ns, chi, covariance)
                 });
             }
         });
         count
+    }
+
+    /// The covariances of the states in the window.
+    fn find_covariances(&mut self) {
+        let Self {
+            window,
+            stamps,
+            covariances,
+            ..
+        } = self;
+        let nothing = Covariance::from_variances(&SVector::zeros());
+        covariances.clear();
+        covariances.resize(stamps.len(), nothing);
+        window.covariances(&mut |index, covariance| {
+            if let Some(slot) = covariances.get_mut(index) {
+                *slot = *covariance;
+            }
+        });
     }
 
     fn hand_over(&mut self) -> Ready<G, D> {
@@ -316,12 +345,7 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
     }
 
     /// Does one piece of work, of about `budget` units at most; false if there is none.
-    fn piece(
-        &mut self,
-        model: &Inertial<G, Left, D>,
-        since: &Since<G, D>,
-        budget: i64,
-    ) -> bool {
+    fn piece(&mut self, model: &Inertial<G, Left, D>, since: &Since<G, D>, budget: i64) -> bool {
         match self.phase {
             Phase::Idle => return false,
             Phase::Solving => {
@@ -330,7 +354,9 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
             }
             Phase::Anticipating => {
                 let mut rest = budget;
-                self.window.anticipate(&mut rest);
+                if !self.window.is_full() || self.window.cover_oldest(&mut rest) {
+                    self.window.anticipate(&mut rest);
+                }
                 self.pace.credit -= budget - rest;
                 return rest < budget;
             }
@@ -339,8 +365,13 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
         let here_ns = self.ready.newest.stamp_ns;
         match self.queue.front().copied() {
             Some(fix) if fix.stamp_ns <= here_ns => {
-                self.queue.pop_front();
-                self.see(&fix);
+                let mut rest = budget;
+                let is_known = !self.window.is_full() || self.window.cover_oldest(&mut rest);
+                self.pace.credit -= budget - rest;
+                if is_known {
+                    self.queue.pop_front();
+                    self.see(&fix);
+                }
                 true
             }
             next => {
@@ -372,10 +403,10 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
     }
 
     fn push(&mut self, stamp_ns: u64, motion: &Preintegration<G, D>) {
-        if let Some(chi) = self.window.push(motion)
+        if let Some(leaving) = self.window.push(motion)
             && let Some(stamp_ns) = self.stamps.pop_front()
         {
-            self.left.push(stamp_ns, &chi);
+            self.left.push(stamp_ns, &leaving);
         }
         self.stamps.push_back(stamp_ns);
         self.is_seen = false;

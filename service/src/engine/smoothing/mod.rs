@@ -203,7 +203,9 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
 
     fn newest(&self) -> Option<(u64, &Belief<G, Left, D>)> {
         let newest = self.since.newest();
-        self.behind.has_begun().then_some((newest.stamp_ns, &newest.belief))
+        self.behind
+            .has_begun()
+            .then_some((newest.stamp_ns, &newest.belief))
     }
 
     fn awaits_input_at(&self, stamp_ns: u64) -> bool {

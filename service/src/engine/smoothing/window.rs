@@ -16,8 +16,17 @@ pub trait AnyWindow<G, const D: usize>: Debug {
     /// [`Window::restart`].
     fn restart(&mut self, first: &Belief<G, Left, D>);
 
-    /// [`Window::push`].
-    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G>;
+    /// [`Window::push`]; with the covariance of the state that leaves.
+    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<Belief<G, Left, D>>;
+
+    /// [`Window::is_full`].
+    fn is_full(&self) -> bool;
+
+    /// [`Window::cover_oldest`].
+    fn cover_oldest(&mut self, budget: &mut i64) -> bool;
+
+    /// Hands over [`Window::covariances`].
+    fn covariances(&self, give: &mut dyn FnMut(usize, &Covariance<D>));
 
     /// [`Window::begin`].
     ///
@@ -55,8 +64,22 @@ impl<G: InertialState<D>, S: Side, const D: usize> AnyWindow<G, D> for Window<G,
         Self::restart(self, first);
     }
 
-    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
-        Self::push(self, motion)
+    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<Belief<G, Left, D>> {
+        let leaving = self.is_full().then(|| self.oldest());
+        Self::push(self, motion);
+        leaving
+    }
+
+    fn is_full(&self) -> bool {
+        Self::is_full(self)
+    }
+
+    fn cover_oldest(&mut self, budget: &mut i64) -> bool {
+        Self::cover_oldest(self, budget)
+    }
+
+    fn covariances(&self, give: &mut dyn FnMut(usize, &Covariance<D>)) {
+        Self::covariances(self, give);
     }
 
     fn begin(&mut self, fix: Fix) -> Result<(), WindowError> {

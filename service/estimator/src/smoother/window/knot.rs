@@ -176,8 +176,9 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         match (&self.fix, &self.gain) {
             (Some(fix), Some(gain)) => {
                 let h = fix.jacobian::<D>(&gain.row);
-                let rest = SMatrix::identity() - gain.gain * h;
-                rest.transpose() * end * rest + h.transpose() * gain.weight * h
+                let by_gain = end * gain.gain;
+                let inner = gain.gain.tr_mul(&by_gain) + gain.weight;
+                end + h.tr_mul(&(inner * h - by_gain.transpose())) - by_gain * h
             }
             _ => *end,
         }

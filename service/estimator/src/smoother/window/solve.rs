@@ -11,6 +11,7 @@
 use nalgebra::SVector;
 
 use super::knot::{Knot, Passage};
+use super::marginal::Cover;
 use super::{Fix, Window, WindowCorrection, WindowError};
 use crate::filter::{Side, Verdict};
 use crate::model::InertialState;
@@ -83,6 +84,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         if self.knots[last].fix.is_some() {
             return Err(WindowError::AlreadySeen);
         }
+        self.cover = Cover::default();
         self.knots[last].fix = Some(fix);
         self.anisotropic += usize::from(!fix.is_isotropic());
         let fresh = self.must_linearise();
@@ -132,8 +134,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     /// Whether all has been done that does not depend on the next fix, if `fix` is the one, of a state to be pushed.
     pub fn is_ready_for(&self, fix: &Fix) -> bool {
         let constant = self.gains_hold && self.is_constant() && fix.is_isotropic();
-        let is_done =
-            |ahead: &Ahead| ahead.next == self.knots.len() && (ahead.fresh || constant);
+        let is_done = |ahead: &Ahead| ahead.next == self.knots.len() && (ahead.fresh || constant);
         !self.is_solving() && (self.is_single() || self.ahead.as_ref().is_some_and(is_done))
     }
 
@@ -184,16 +185,25 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         self.solve.is_some()
     }
 
-    /// The units of work of the next push and update.
+    /// The units of work of the next push and update, and of the covariance of the state that leaves.
     pub fn work(&self) -> i64 {
         let states = (self.knots.len() + 1).min(self.options.capacity) as i64;
-        let each = states * (self.work_forward() + self.work_back());
+        let of_oldest = if self.is_full() {
+            self.work_of_cover()
+        } else {
+            0
+        };
+        let each = states * (of_oldest + self.work_forward() + self.work_back());
         self.options.iterations as i64 * each + self.work_of_push()
     }
 
     /// The units of work of a push.
     pub fn work_of_push(&self) -> i64 {
         3 * work::matrices(D, self.is_tracked())
+    }
+
+    pub(super) fn work_of_cover(&self) -> i64 {
+        work::matrices(D, self.is_tracked())
     }
 
     fn work_forward(&self) -> i64 {
@@ -349,7 +359,10 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     ) -> bool {
         let tracked = self.is_tracked();
         let cost = self.work_back();
-        let states = self.knots.range_mut(..*end).zip(self.passages.range(..*end));
+        let states = self
+            .knots
+            .range_mut(..*end)
+            .zip(self.passages.range(..*end));
         for (knot, passage) in states.rev() {
             if *budget <= 0 {
                 return false;

@@ -120,17 +120,6 @@ impl Track {
         carried
     }
 
-    /// F.
-    pub fn matrix<const D: usize>(&self, inputs: &InputJacobian) -> SMatrix<f64, D, D> {
-        let mut f = SMatrix::<f64, D, D>::identity();
-        for column in 0..D {
-            let mut unit = SVector::<f64, D>::zeros();
-            unit[column] = 1.0;
-            f.set_column(column, &self.carry(&unit, inputs));
-        }
-        f
-    }
-
     /// `F P F^T + Q`, into `result`.
     pub fn carry_covariance<const D: usize>(
         &self,

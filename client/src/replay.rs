@@ -35,7 +35,7 @@ pub struct ReplayOptions {
     pub out: PathBuf,
     /// The CSV of smoothed states to write, if one is wanted; the daemon must have a smoother.
     pub smoothed: Option<PathBuf>,
-    /// Whether the estimate CSV has the covariance.
+    /// Whether the CSVs have the covariance.
     pub covariance: bool,
     /// The daemon to feed if none is started.
     pub instance: Instance,
@@ -101,7 +101,7 @@ fn feed<E: Estimate>(
         .with_context(|| options.dir.display().to_string())?;
     let mut session = Session::<E>::open(instance)?;
     let mut smoothed = match &options.smoothed {
-        Some(path) => Some(SmoothedOutput::new(instance, path)?),
+        Some(path) => Some(SmoothedOutput::new(instance, path, options.covariance)?),
         None => None,
     };
     session.set_initial(&dataset.meta)?;

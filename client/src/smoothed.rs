@@ -2,10 +2,10 @@
 //!
 //! Columns as in the estimate CSV; one row for each moment at which the smoother had a fix, in the order of time: the
 //! states that have left the window, and those that are in it at the end. Of several states of one moment the last is
-//! the row, for it has seen them all.
+//! the row, for it has seen them all. With covariance, that of each state given all fixes, before and after.
 
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
@@ -14,7 +14,7 @@ use inekf_shared::topic::Instance;
 
 use crate::control::Controller;
 use crate::read::SmoothedReader;
-use crate::table::estimate::Layout;
+use crate::table::estimate::{Layout, triangle_len};
 use crate::table::{EstimateState, EstimateWriter};
 
 /// The mean, as in the estimate CSV.
@@ -32,25 +32,28 @@ pub fn state(state: &SmoothedState) -> EstimateState {
 pub struct SmoothedOutput {
     path: PathBuf,
     reader: SmoothedReader,
-    writer: EstimateWriter<BufWriter<File>>,
+    covariance: bool,
+    /// Until the first state says how large the covariance is.
+    file: Option<File>,
+    writer: Option<EstimateWriter<BufWriter<File>>>,
     /// The row that the next state of its moment replaces.
     current: Option<SmoothedState>,
     rows: usize,
 }
 
 impl SmoothedOutput {
-    /// Reads from the daemon of `instance` from now on, and writes to `path`.
+    /// Reads from the daemon of `instance` from now on, and writes to `path`, the covariances too if `covariance` says so.
     ///
     /// # Errors
     /// The topic cannot be opened, or the file not be created.
-    pub fn new(instance: &Instance, path: &Path) -> anyhow::Result<Self> {
+    pub fn new(instance: &Instance, path: &Path, covariance: bool) -> anyhow::Result<Self> {
         let file = File::create(path).with_context(|| format!("creating {}", path.display()))?;
-        let writer = EstimateWriter::new(BufWriter::new(file), Layout::Navigation, None)
-            .with_context(|| format!("writing {}", path.display()))?;
         Ok(Self {
             path: path.to_owned(),
             reader: SmoothedReader::open(instance)?,
-            writer,
+            covariance,
+            file: Some(file),
+            writer: None,
             current: None,
             rows: 0,
         })
@@ -90,9 +93,13 @@ impl SmoothedOutput {
         if let Some(last) = self.current.take() {
             self.write(&last)?;
         }
-        self.writer
-            .finish()
-            .with_context(|| format!("writing {}", self.path.display()))?;
+        let context = || format!("writing {}", self.path.display());
+        if let Some(file) = self.file.take() {
+            self.writer = Some(header(file, None).with_context(context)?);
+        }
+        if let Some(writer) = self.writer {
+            writer.finish().with_context(context)?;
+        }
         Ok(self.rows)
     }
 
@@ -104,10 +111,19 @@ impl SmoothedOutput {
     }
 
     fn write(&mut self, row: &SmoothedState) -> anyhow::Result<()> {
+        let context = || format!("writing {}", self.path.display());
+        let dimension = self.covariance.then_some(row.dimension as usize);
+        if let Some(file) = self.file.take() {
+            self.writer = Some(header(file, dimension).with_context(context)?);
+        }
+        let entries = dimension.map_or(0, triangle_len).min(row.covariance.len());
         self.rows += 1;
-        self.writer
-            .write(row.stamp_ns, &state(row), &[])
-            .with_context(|| format!("writing {}", self.path.display()))
+        match &mut self.writer {
+            Some(writer) => writer
+                .write(row.stamp_ns, &state(row), &row.covariance[..entries])
+                .with_context(context),
+            None => Ok(()),
+        }
     }
 
     fn require_all(&self) -> anyhow::Result<()> {
@@ -119,4 +135,9 @@ impl SmoothedOutput {
         }
         Ok(())
     }
+}
+
+/// The table with its first line.
+fn header(file: File, dimension: Option<usize>) -> io::Result<EstimateWriter<BufWriter<File>>> {
+    EstimateWriter::new(BufWriter::new(file), Layout::Navigation, dimension)
 }

@@ -138,7 +138,7 @@ fn every_code_has_a_name_of_its_own_and_an_undefined_one_is_unknown() {
     }
     assert!((REASON_NOT_READY as usize) < REASONS);
     assert_eq!(INPUT_HEADING + 1, INPUTS);
-    assert_eq!(ESTIMATE_FLAGS, 63);
+    assert_eq!(ESTIMATE_FLAGS, 127);
     assert_eq!(JOURNAL_HEADING as usize, INPUT_HEADING + 1);
 }
 

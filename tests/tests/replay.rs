@@ -80,6 +80,8 @@ fn smoothed_states_are_the_same_bytes_however_fast_one_row_for_each_fix() {
         let fixes: BTreeSet<u64> = positions.chain(velocities).collect();
         assert!(rows.len() > 10 && rows.len() <= fixes.len());
         assert!(rows.iter().all(|row| fixes.contains(&row.stamp_ns)));
+        let is_sound = |triangle: &[f64]| triangle.len() == 120 && triangle[0] > 0.0;
+        assert!(rows.iter().all(|row| is_sound(&row.covariance)));
     }
 }
 

@@ -141,7 +141,7 @@ impl Config {
         let smooths = filter.estimator == Estimator::Smoother && root.is_sound("estimator");
         let update = root.section("update", |update| Update::read(update, smooths));
         let position_sources = PositionSource::read_all(root, model);
-        let motion = Motion::read(root, model, smooths, top, tables);
+        let motion = Motion::read(root, model, top, tables);
 
         let ids: Vec<u32> = position_sources.iter().map(|source| source.id).collect();
         let known_ids = root.is_sound("position_source").then_some(&*ids);

@@ -6,7 +6,6 @@ use super::interval::Interval;
 use super::noise::{self, InertialNoise, OdometryNoise};
 use super::odometry::Rows;
 use super::section::Section;
-use super::smoother::NO_HEADING;
 use super::sources::{HeadingSource, VelocitySource};
 
 /// Why a key of inertial navigation is refused.
@@ -114,12 +113,10 @@ impl Tables {
 }
 
 impl Motion {
-    /// Puts together what belongs to `model`, and refuses the sensors that it, or a smoother if it `smooths`, has no
-    /// use for.
+    /// Puts together what belongs to `model`, and refuses the sensors that it has no use for.
     pub(super) fn read(
         root: &mut Section<'_, '_>,
         model: Option<Model>,
-        smooths: bool,
         top: InertialTop,
         tables: Tables,
     ) -> Self {
@@ -132,12 +129,7 @@ impl Motion {
         }
         let noise = tables.noise.0;
         let velocity_sources = VelocitySource::read_all(root);
-        let heading_sources = if smooths {
-            root.refuse_unread(&["heading_source"], NO_HEADING);
-            Vec::new()
-        } else {
-            HeadingSource::read_all(root)
-        };
+        let heading_sources = HeadingSource::read_all(root);
         Self::Inertial(Inertial {
             velocity_sources,
             heading_sources,

@@ -6,10 +6,6 @@ use super::section::Section;
 /// Why a key of the filters is refused.
 pub(super) const NOT_SMOOTHED: &str =
     "estimator = \"smoother\" does not use this, but [smoother] iterations: remove it";
-/// Why a source of heading is refused.
-pub(super) const NO_HEADING: &str =
-    "estimator = \"smoother\" takes fixes of position and velocity only: remove it";
-
 /// The smoother over the newest fixes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Smoother {

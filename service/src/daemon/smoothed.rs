@@ -65,7 +65,7 @@ impl SmoothedPort {
     /// A sentence that says why there are none.
     pub fn answer<M: Model, H: History<M>>(
         &mut self,
-        engine: &Engine<M, H>,
+        engine: &mut Engine<M, H>,
         request_id: u64,
     ) -> Result<u64, &'static str> {
         if request_id == 0 {

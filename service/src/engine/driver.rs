@@ -80,6 +80,11 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         }
     }
 
+    /// What lies behind the newest estimate.
+    pub(super) fn history(&self) -> &H {
+        &self.history
+    }
+
     /// The counters.
     pub fn tally(&self) -> &Tally {
         &self.output.tally
@@ -275,8 +280,11 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     ///
     /// # Errors
     /// A sentence that says why there is none.
-    pub fn smoothed(&self, give: &mut dyn FnMut(&SmoothedState)) -> Result<usize, &'static str> {
-        match self.history.smoothed(give) {
+    pub fn smoothed(
+        &mut self,
+        give: &mut dyn FnMut(&SmoothedState),
+    ) -> Result<usize, &'static str> {
+        match self.history.smoothed(&self.model, give) {
             None => Err("the estimator is no smoother: there is no window of smoothed states"),
             Some(0) => Err("there is no state yet: the daemon is not initialised"),
             Some(count) => Ok(count),
@@ -555,7 +563,7 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         self.requested = None;
         self.give_up_earlier();
         self.output.started(stamp_ns, &self.model.place_w(&state));
-        self.history.start(stamp_ns, input, state);
+        self.history.start(&self.model, stamp_ns, input, state);
         self.time_base.advance_to(stamp_ns);
     }
 
@@ -567,7 +575,7 @@ impl<M: Model, H: History<M>> Engine<M, H> {
             + u64::from(self.first_position.is_some());
         let tally = &mut self.output.tally;
         tally.refuse_all(Refusal(REASON_NOT_READY), waiting);
-        self.history.clear();
+        self.history.clear(&self.model);
         self.early.clear();
         self.model.forget_attitude();
         self.first_position = None;

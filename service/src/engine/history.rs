@@ -37,6 +37,15 @@ pub enum Event<'a, X, Z> {
         /// Whether samples were replayed.
         replayed: bool,
     },
+    /// The estimate is the smoothed one now: what the window makes of all fixes so far.
+    Smoothed {
+        /// Time of the state: the newest one.
+        stamp_ns: u64,
+        /// From now on.
+        state: &'a X,
+        /// Source of the last fix.
+        source: u32,
+    },
 }
 
 /// What became of a fix that was handed in.
@@ -60,10 +69,10 @@ pub struct Breakdown;
 pub trait History<M: Model>: Debug {
     /// Forgets everything and starts from `state` at `stamp_ns`; `input` is the sample of that
     /// stamp if there is one.
-    fn start(&mut self, stamp_ns: u64, input: Option<M::Input>, state: M::State);
+    fn start(&mut self, model: &M, stamp_ns: u64, input: Option<M::Input>, state: M::State);
 
     /// Forgets everything.
-    fn clear(&mut self);
+    fn clear(&mut self, model: &M);
 
     /// Number of messages whose fixes have not been judged.
     fn waiting(&self) -> u64;
@@ -109,8 +118,8 @@ pub trait History<M: Model>: Debug {
     }
 
     /// Hands over the states of the window, oldest first, and says how many they are; `None` if there is no window.
-    fn smoothed(&self, give: &mut dyn FnMut(&SmoothedState)) -> Option<usize> {
-        let _ = give;
+    fn smoothed(&mut self, model: &M, give: &mut dyn FnMut(&SmoothedState)) -> Option<usize> {
+        let _ = (model, give);
         None
     }
 }

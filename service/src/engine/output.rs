@@ -3,8 +3,8 @@
 use inekf::filter::{Covariance, Verdict};
 use inekf_shared::message::{
     ESTIMATE_DEGRADED, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED, ESTIMATE_RESET, ESTIMATE_RESUMED,
-    ESTIMATE_UPDATED, EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL, STATE_DEGRADED,
-    STATE_RUNNING,
+    ESTIMATE_SMOOTHED, ESTIMATE_UPDATED, EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL,
+    STATE_DEGRADED, STATE_RUNNING,
 };
 use nalgebra::Vector3;
 
@@ -137,6 +137,11 @@ impl<E: EstimateMessage> Output<E> {
                 };
                 self.publish(model, *stamp_ns, state, flags, fix.source, outbox);
             }
+            Event::Smoothed {
+                stamp_ns,
+                state,
+                source,
+            } => self.publish(model, *stamp_ns, state, ESTIMATE_SMOOTHED, *source, outbox),
         }
     }
 

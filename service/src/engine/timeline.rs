@@ -164,8 +164,8 @@ impl<M: Model> Timeline<M> {
 }
 
 impl<M: Model> History<M> for Timeline<M> {
-    fn start(&mut self, stamp_ns: u64, input: Option<M::Input>, state: M::State) {
-        self.clear();
+    fn start(&mut self, model: &M, stamp_ns: u64, input: Option<M::Input>, state: M::State) {
+        self.clear(model);
         self.knots.push_back(Knot {
             stamp_ns,
             input,
@@ -173,7 +173,7 @@ impl<M: Model> History<M> for Timeline<M> {
         });
     }
 
-    fn clear(&mut self) {
+    fn clear(&mut self, _model: &M) {
         self.knots.clear();
         self.entries.clear();
         self.lockout.clear();

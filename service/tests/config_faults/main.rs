@@ -632,7 +632,7 @@ fn files_that_cannot_be_read_say_why() {
 #[test]
 fn each_fault_about_the_smoother() {
     let smoother = "estimator = \"smoother\"";
-    let cases: [(&str, &str, &str, &[&str]); 8] = [
+    let cases: [(&str, &str, &str, &[&str]); 7] = [
         (
             smoother,
             "[smoother]\nwindow = 0",
@@ -668,12 +668,6 @@ fn each_fault_about_the_smoother() {
             "[update]\ntransport = \"none\"",
             "update.transport",
             &["[smoother] iterations"],
-        ),
-        (
-            smoother,
-            "[[heading_source]]\nid = 0",
-            "heading_source",
-            &["position and velocity only"],
         ),
         (
             "estimator = \"smoother\"\nmismatch = \"consider\"",

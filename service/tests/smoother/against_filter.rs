@@ -104,3 +104,22 @@ fn the_covariance_of_a_window_of_one_state_is_that_of_the_plain_filter() {
     let smoothed = full(smoothing("", 1, "")).run(&inputs);
     assert!(difference(&smoothed, &filtered) < ROUNDING);
 }
+
+#[test]
+fn headings_are_taken_as_the_plain_filter_takes_them() {
+    let sources = "[[heading_source]]\nid = 0\n";
+    let inputs = crate::common::circle(10);
+    let mut plain = settings("", sources);
+    plain.fusion.update.iterations = 1;
+    plain.fusion.update.transport = Transport::None;
+    let mut filter = InertialEngine::<NavState, Left, 15>::new(plain);
+    let mut smoother = full(smoothing("", 1, sources));
+    let (filtered, smoothed) = (filter.run(&inputs), smoother.run(&inputs));
+    assert!(difference(&smoothed, &filtered) < ROUNDING);
+    assert_eq!(smoother.tally().counters, filter.tally().counters);
+    let without = full(smoothing("", 1, "")).run(&circle(10));
+    assert!(
+        difference(&without, &filtered) > 1e-6,
+        "the headings have a say"
+    );
+}

@@ -75,7 +75,8 @@ fn the_estimate_of_a_sample_is_the_newest_state_composed_with_the_motion_since()
         // The sample is out before the window is solved, and again after.
         assert_eq!(flags, [ESTIMATE_PROPAGATED, ESTIMATE_UPDATED]);
         motion.push(&input, &G_W, 6_666_667.0 * 1e-9, zoh, &noise);
-        left.extend(window.push(&motion));
+        let oldest = window.smoothed(0).unwrap();
+        left.extend(window.push(&motion).map(|_| oldest));
         window
             .update(PositionObservation {
                 position_w: fix.position_w_m.into(),
@@ -100,25 +101,40 @@ fn the_estimate_of_a_sample_is_the_newest_state_composed_with_the_motion_since()
         1 + 13 - WINDOW,
         "the start, and of 13 fixes all but four"
     );
-    let as_message = |chi: &NavState| {
+    let as_message = |state: &Belief<NavState, Left, 15>| {
         (
-            <[f64; 3]>::from(chi.pose.position),
-            <[f64; 3]>::from(chi.gyro_bias),
+            <[f64; 3]>::from(state.mean.pose.position),
+            <[f64; 3]>::from(state.mean.gyro_bias),
+            state.covariance.upper_triangle().collect::<Vec<_>>(),
         )
     };
-    for (index, (state, chi)) in taken.iter().zip(&left).enumerate() {
+    let of = |state: &SmoothedState| (state.p_w_m, state.gyro_bias_rps, state.covariance.to_vec());
+    for (index, (state, expected)) in taken.iter().zip(&left).enumerate() {
         assert_eq!((state.index, state.flags), (index as u64, 0));
-        assert_eq!((state.p_w_m, state.gyro_bias_rps), as_message(chi));
+        assert_eq!(of(state), as_message(expected));
     }
     let mut inside = Vec::new();
     assert_eq!(
         engine.smoothed(&mut |state| inside.push(*state)),
         Ok(WINDOW)
     );
-    for (index, (state, chi)) in inside.iter().zip(window.states()).enumerate() {
+    for (index, state) in inside.iter().enumerate() {
         assert_eq!((state.index, state.count), (index as u64, WINDOW as u64));
-        assert_eq!((state.p_w_m, state.gyro_bias_rps), as_message(chi));
+        let expected = window.smoothed(index).unwrap();
+        let (actual, wanted) = (of(state), as_message(&expected));
+        assert_eq!((actual.0, actual.1), (wanted.0, wanted.1));
+        // Linearised where the states are now, for the next fix: not where they were before their last step.
+        let sigma = expected.covariance.matrix().diagonal().map(f64::sqrt);
+        let mut entries = actual.2.iter().zip(&wanted.2);
+        for row in 0..15 {
+            for column in row..15 {
+                let (actual, wanted) = entries.next().expect("an entry of the triangle");
+                let off = (actual - wanted).abs() / (sigma[row] * sigma[column]);
+                assert!(off < 1e-3, "state {index}, {row}, {column}: off by {off}");
+            }
+        }
     }
+    assert_eq!(inside.len(), WINDOW);
     let stamps: Vec<u64> = taken
         .iter()
         .chain(&inside)

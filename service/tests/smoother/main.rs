@@ -9,6 +9,7 @@ mod against_library;
 mod allocation;
 #[path = "../../estimator/tests/common/counting.rs"]
 mod counting;
+mod effort;
 mod golden;
 mod late;
 mod lockout;

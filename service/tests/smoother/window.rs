@@ -92,9 +92,17 @@ fn a_filter_has_no_window() {
 }
 
 #[test]
-fn a_heading_is_refused() {
+fn a_heading_makes_a_state_of_the_window_and_one_of_an_unknown_source_does_not() {
     let mut engine = driven();
-    engine.feed(&Input::Heading(heading(stamp(399), 1)), &mut Vec::new());
+    let accepted = engine.tally().counters.accepted;
+    left(&mut engine);
+    let mut fix = heading(stamp(399), 1);
+    engine.feed(&Input::Heading(fix), &mut Vec::new());
+    assert_eq!(engine.tally().counters.accepted, accepted + 1);
+    assert_eq!(engine.smoothed(&mut |_| ()), Ok(6));
+    assert_eq!(left(&mut engine).len(), 1);
+    fix.source = 2;
+    engine.feed(&Input::Heading(fix), &mut Vec::new());
     assert_refused(engine.tally(), &[(REASON_UNKNOWN_SOURCE, 1)]);
 }
 

@@ -23,13 +23,17 @@ pub const ESTIMATE_DEGRADED: u32 = 8;
 pub const ESTIMATE_REPLAYED: u32 = 16;
 /// Flag: the first estimate after a start from a checkpoint.
 pub const ESTIMATE_RESUMED: u32 = 32;
+/// Flag: the window of a smoother has seen all fixes so far, and this estimate comes from it; the estimate before it has
+/// the same stamp.
+pub const ESTIMATE_SMOOTHED: u32 = 64;
 /// Every flag that is defined.
 pub const ESTIMATE_FLAGS: u32 = ESTIMATE_PROPAGATED
     | ESTIMATE_UPDATED
     | ESTIMATE_RESET
     | ESTIMATE_DEGRADED
     | ESTIMATE_REPLAYED
-    | ESTIMATE_RESUMED;
+    | ESTIMATE_RESUMED
+    | ESTIMATE_SMOOTHED;
 
 /// Model: an IMU drives SE_2(3) with biases ([`EstimateSe23`]).
 pub const MODEL_IMU: u32 = 1;
@@ -54,6 +58,7 @@ pub const fn estimate_flag_name(flag: u32) -> &'static str {
         ESTIMATE_DEGRADED => "degraded",
         ESTIMATE_REPLAYED => "replayed",
         ESTIMATE_RESUMED => "resumed",
+        ESTIMATE_SMOOTHED => "smoothed",
         _ => "unknown",
     }
 }

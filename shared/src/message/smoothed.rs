@@ -4,6 +4,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 use super::layout::layout;
+use super::{NAV_TRI, serde_array};
 
 /// Flag: the state left the window before its time, because the window began anew: after a set-state request, a reset,
 /// a long gap or a lock-out.
@@ -11,11 +12,10 @@ pub const SMOOTHED_CUT: u32 = 1;
 /// All flags that are defined.
 pub const SMOOTHED_FLAGS: u32 = SMOOTHED_CUT;
 
-/// The last estimate of a state that has left the window, or the present one of a state in it. Its mean only:
-/// the covariance of a state amid the window takes matrix products for each later one.
+/// The last estimate of a state that has left the window, or the present one of a state in it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.SmoothedState.v1")]
+#[type_name("inekf.SmoothedState.v2")]
 pub struct SmoothedState {
     /// Time of the state: that of the fix that made it, nanoseconds of the sensor clock.
     pub stamp_ns: u64,
@@ -39,11 +39,16 @@ pub struct SmoothedState {
     pub gyro_bias_rps: [f64; 3],
     /// Accelerometer bias, body frame, m/s^2.
     pub accel_bias_mps2: [f64; 3],
+    /// Upper triangle of the covariance of the left-invariant error given all fixes that the window has seen, before and
+    /// after this state. With 9 states the triangle of the 9 x 9 fills the first 45 entries and the rest is zero.
+    #[serde(with = "serde_array")]
+    pub covariance: [f64; NAV_TRI],
 }
 
 layout! {
-    SmoothedState as "inekf.SmoothedState.v1", size 168, align 8 {
+    SmoothedState as "inekf.SmoothedState.v2", size 1128, align 8 {
         stamp_ns: 0, request_id: 8, index: 16, count: 24, dimension: 32, flags: 36, q_wb: 40, v_w_mps: 72,
         p_w_m: 96, gyro_bias_rps: 120, accel_bias_mps2: 144,
+        covariance: 168,
     }
 }

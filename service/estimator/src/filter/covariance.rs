@@ -91,17 +91,9 @@ impl<const D: usize> Covariance<D> {
     /// Lets `change` work on the matrix, which it leaves exactly symmetric; a variance that rounding took below
     /// zero is put back.
     #[inline]
-    pub(super) fn change_symmetrically(&mut self, change: impl FnOnce(&mut SMatrix<f64, D, D>)) {
+    pub(crate) fn change_symmetrically(&mut self, change: impl FnOnce(&mut SMatrix<f64, D, D>)) {
         change(&mut self.0);
         put_back_negative_variances(&mut self.0);
-    }
-
-    /// The same, of a product that is a covariance but for rounding.
-    pub(crate) fn from_rounded(matrix: SMatrix<f64, D, D>) -> Self {
-        let mut matrix = matrix;
-        put_back_negative_variances(&mut matrix);
-        mirror(&mut matrix);
-        Self(matrix)
     }
 
     /// Independent components with these variances.
@@ -153,7 +145,7 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// [`corrected`](Self::corrected) where `P H^T` is known.
-    pub(super) fn corrected_with<const M: usize>(
+    pub(crate) fn corrected_with<const M: usize>(
         &self,
         p_ht: &SMatrix<f64, D, M>,
         gain: &SMatrix<f64, D, M>,

@@ -52,6 +52,21 @@ fn composed(first: &ImuStep, second: &ImuStep) -> ImuStep {
     }
 }
 
+/// `J_r(xi) B`, by the blocks of J_r that are not zero.
+fn carried_inputs(xi: &SVector<f64, 9>, b: &SMatrix<f64, 9, 6>) -> SMatrix<f64, 9, 6> {
+    let j = SE23::right_jacobian(xi);
+    let block = |row, column| j.fixed_view::<3, 3>(row, column);
+    let of = |row| b.fixed_view::<3, 6>(row, 0);
+    let mut carried = SMatrix::<f64, 9, 6>::zeros();
+    let turned = block(0, 0) * of(0);
+    carried.fixed_view_mut::<3, 6>(0, 0).copy_from(&turned);
+    for row in [3, 6] {
+        let sum = block(row, 0) * of(0) + block(row, row) * of(row);
+        carried.fixed_view_mut::<3, 6>(row, 0).copy_from(&sum);
+    }
+    carried
+}
+
 impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
     /// No motion yet, to be integrated with the biases of `reference`.
     pub fn new(reference: &G) -> Self {
@@ -114,7 +129,7 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
     }
 
     /// The motion at the biases of `chi`.
-    fn motion_of(&self, chi: &G) -> ImuStep {
+    pub(super) fn motion_of(&self, chi: &G) -> ImuStep {
         if G::IS_GROUP_AFFINE {
             return self.motion;
         }
@@ -124,7 +139,7 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
         let xi = -(self.motion.input_jacobian * bias);
         let mut corrected = self.motion;
         corrected.step.body = corrected.step.body.compose(&SE23::exp(&xi));
-        corrected.input_jacobian = SE23::right_jacobian(&xi) * corrected.input_jacobian;
+        corrected.input_jacobian = carried_inputs(&xi, &self.motion.input_jacobian);
         corrected
     }
 

@@ -11,8 +11,12 @@
 //! the covariance is the left-invariant Kalman filter's: one covariance step for each new state, and a few
 //! matrix-vector products for each state of the window and iteration. That holds for a state without biases, with
 //! a prior of frozen covariance ([`PriorForm`]), the Jacobian of the motion's residual left out, a parametrisation
-//! that is left-invariant to first order, and fixes with equal noise on all axes. Everything else is
+//! that is left-invariant to first order, and fixes of position and velocity with equal noise on all axes. Everything else is
 //! linearised anew at each iteration; the window sees by itself which it is.
+//!
+//! An update can be done at once, or in slices between other work; much of the next one can be done before its fix is
+//! there ([`Window::anticipate`]), and then the newest state is smoothed as soon as a filter would correct it. The result
+//! is the same bit for bit.
 //!
 //! All memory is taken at construction. A second fix of one moment is a state of its own, at the end of a
 //! motion of no length: [`Preintegration::new`], pushed as it is.
@@ -29,12 +33,16 @@ use crate::smoother::{Gaussian, Jacobians, Preintegration};
 
 mod fix;
 mod knot;
+mod marginal;
 mod prior;
+mod solve;
 mod track;
 
 use knot::{Knot, Passage};
+use marginal::Cover;
 use prior::Prior;
-use track::Track;
+use solve::{Ahead, Solve};
+use track::{InputJacobian, Track};
 
 pub use fix::Fix;
 pub use prior::PriorForm;
@@ -75,7 +83,8 @@ impl WindowOptions {
 pub struct WindowCorrection {
     /// Whether the fix was used.
     pub verdict: Verdict,
-    /// Normalised innovation squared of the new fix given all before it: chi-square with 3 degrees of freedom.
+    /// Normalised innovation squared of the new fix given all before it: chi-square with 3 degrees of
+    /// freedom, 1 for a heading.
     pub nis: f64,
     /// Gauss-Newton iterations done.
     pub iterations: usize,
@@ -122,6 +131,16 @@ pub struct Window<G, S, const D: usize> {
     anisotropic: usize,
     /// Whether the gains that are stored are those of terms which do not depend on the estimate.
     gains_hold: bool,
+    /// The update that is under way.
+    solve: Option<Solve<D>>,
+    /// What was predicted for the newest state before that.
+    kept: Covariance<D>,
+    /// What has been done for the next update.
+    ahead: Option<Ahead>,
+    /// How far the covariance of the oldest state has come.
+    cover: Cover<D>,
+    /// Whether the oldest state has been marginalised: it is there to be looked at, until the next one comes.
+    gone: bool,
     side: PhantomData<S>,
 }
 
@@ -140,6 +159,11 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             passages: VecDeque::with_capacity(options.capacity),
             anisotropic: 0,
             gains_hold: false,
+            solve: None,
+            kept: first.covariance,
+            ahead: None,
+            cover: Cover::default(),
+            gone: false,
             side: PhantomData,
         };
         window.restart(first);
@@ -154,6 +178,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         let passage = Passage {
             motion: Preintegration::new(&first.mean),
             transition: SMatrix::identity(),
+            inputs: InputJacobian::zeros(),
             predicted: first.covariance,
         };
         let track = Track::new(&passage.motion.motion().step);
@@ -161,6 +186,10 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         self.knots.push_back(knot);
         self.passages.push_back(passage);
         self.anisotropic = 0;
+        self.solve = None;
+        self.ahead = None;
+        self.cover = Cover::default();
+        self.gone = false;
         self.gains_hold = self.is_constant();
     }
 
@@ -173,41 +202,58 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     }
 
     /// Adds the state at the end of `motion`. If the window is full its oldest state leaves first, and its last
-    /// estimate, smoothed by all fixes since, is returned.
+    /// estimate, smoothed by all fixes since, is returned. An update that is under way is finished before.
     pub fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
+        self.finish();
         let newest = self.newest_knot();
-        let track = Track::new(&motion.motion().step);
-        let (chi, transition, predicted) = if self.is_affine() {
-            let predicted = track.carry_covariance(&newest.filtered, motion.noise());
-            (track.apply(&newest.chi), SMatrix::identity(), predicted)
-        } else {
-            let (chi, transition) = motion.transition(&newest.chi);
-            let carried = newest.filtered.transformed(&transition);
-            (chi, transition, carried.plus(motion.noise().matrix()))
-        };
         let mut passage = Passage {
             motion: *motion,
-            transition,
-            predicted,
+            transition: SMatrix::identity(),
+            inputs: InputJacobian::zeros(),
+            predicted: newest.filtered,
         };
-        let knot = Knot::new(chi, track, &predicted);
-        let left = self
-            .is_full()
-            .then(|| self.marginalise(&knot, &mut passage));
+        let track = passage.track(&newest.chi);
+        let chi = track.apply(&newest.chi).normalized();
+        track.carry_covariance(
+            &newest.filtered,
+            motion.noise(),
+            &passage.inputs,
+            &mut passage.predicted,
+        );
+        let mut knot = Knot::new(chi, track, &passage.predicted);
+        let left = self.is_full().then(|| {
+            if !self.gone {
+                self.marginalise(Some((&mut knot, &mut passage)));
+                self.ahead = None;
+            }
+            self.pop()
+        });
         self.knots.push_back(knot);
         self.passages.push_back(passage);
-        left
+        self.cover = Cover::default();
+        left.flatten()
     }
 
-    /// Removes the oldest state; what is known from it becomes the prior of the next one, which is the given one if
-    /// the window is empty then. Gives its estimate.
-    fn marginalise(&mut self, knot: &Knot<G, D>, passage: &mut Passage<G, D>) -> G {
-        let (fresh, affine) = (self.must_linearise(), self.is_affine());
+    /// Forgets the oldest state, which has been marginalised. Gives its estimate.
+    fn pop(&mut self) -> Option<G> {
+        self.gone = false;
+        if let Some(ahead) = &mut self.ahead {
+            ahead.next -= 1;
+        }
+        self.passages.pop_front();
+        self.knots.pop_front().map(|knot| knot.chi)
+    }
+
+    /// Marginalises the oldest state: what is known from it becomes the prior of the next one, which is the `entering`
+    /// one if there is no other.
+    fn marginalise(&mut self, entering: Option<(&mut Knot<G, D>, &mut Passage<G, D>)>) {
+        let (fresh, tracked) = (self.must_linearise(), self.is_tracked());
         let first = &mut self.knots[0];
         if fresh {
             let prior = self.prior.at::<S>(&first.chi);
             // It was positive definite at the last update, if there is a fix.
-            first.weigh(&prior.covariance);
+            first.filtered = prior.covariance;
+            first.weigh();
             first.correct(prior.mean);
         } else {
             let wanted = self.prior.mean_at::<S>(&first.chi);
@@ -215,166 +261,49 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         }
         let (left, mean, filtered) = (first.chi, first.correction, first.filtered);
         self.anisotropic -= usize::from(first.fix.is_some_and(|fix| !fix.is_isotropic()));
-        self.knots.pop_front();
-        self.passages.pop_front();
 
-        let (next, passage) = match (self.knots.front(), self.passages.front_mut()) {
-            (Some(next), Some(passage)) => (next, passage),
-            _ => (knot, passage),
+        let (next, passage) = match (self.knots.get_mut(1), self.passages.get_mut(1), entering) {
+            (Some(next), Some(passage), _) => (next, passage),
+            (_, _, Some(entering)) => entering,
+            _ => return,
         };
-        let mean = if affine {
-            if fresh {
-                passage.predicted = next
-                    .track
-                    .carry_covariance(&filtered, passage.motion.noise());
+        let correction = if tracked {
+            if !G::IS_GROUP_AFFINE {
+                next.track = passage.track(&left);
             }
-            next.track.carry(&mean) + next.offset::<S>(&left)
+            if fresh {
+                let Passage {
+                    motion,
+                    inputs,
+                    predicted,
+                    ..
+                } = passage;
+                let noise = motion.noise();
+                next.track
+                    .carry_covariance(&filtered, noise, inputs, predicted);
+            }
+            Gaussian {
+                mean: next.track.carry(&mean, &passage.inputs) + next.offset::<S>(&left),
+                covariance: passage.predicted,
+            }
         } else {
-            let offset = passage.link::<S>(&left, &next.chi, &filtered, self.options.jacobians);
-            passage.transition * mean + offset
-        };
-        let correction = Gaussian {
-            mean,
-            covariance: passage.predicted,
+            let (offset, predicted) = passage.link::<S>(&left, &next.chi, &filtered);
+            Gaussian {
+                mean: passage.transition * mean + offset,
+                covariance: predicted,
+            }
         };
         self.prior = Prior::new::<S>(self.options.prior, &next.chi, &correction);
-        left
     }
 
-    /// Takes in a fix of the newest state and smooths the window.
-    ///
-    /// # Errors
-    /// [`WindowError`]; the states are then unchanged, as they are when the fix is gated.
-    pub fn update(&mut self, fix: impl Into<Fix>) -> Result<WindowCorrection, WindowError> {
-        let fix = fix.into();
-        let last = self.knots.len() - 1;
-        if self.knots[last].fix.is_some() {
-            return Err(WindowError::AlreadySeen);
-        }
-        self.knots[last].fix = Some(fix);
-        self.anisotropic += usize::from(!fix.is_isotropic());
-        let passage = self.must_linearise().then(|| self.passages[last]);
-        let mut steps = 0;
-        let outcome = self.iterate(&mut steps);
-        if !matches!(outcome, Ok(correction) if correction.verdict == Verdict::Accepted) {
-            self.anisotropic -= usize::from(!fix.is_isotropic());
-            if let Some(passage) = passage {
-                self.passages[last] = passage;
-            }
-            self.knots[last].unsee(&self.passages[last]);
-            if steps > 0 {
-                for knot in &mut self.knots {
-                    knot.chi = knot.before;
-                }
-            }
-        }
-        outcome
-    }
-
-    /// Gauss-Newton; counts the steps that moved the states.
-    fn iterate(&mut self, steps: &mut usize) -> Result<WindowCorrection, WindowError> {
-        let mut correction = WindowCorrection {
-            verdict: Verdict::Accepted,
-            nis: f64::NAN,
-            iterations: self.options.iterations,
-        };
-        while *steps < self.options.iterations {
-            self.forward()?;
-            if *steps == 0 {
-                let newest = self.newest_knot();
-                correction.nis = newest.innovation.dot(&newest.weighted);
-                if !correction.nis.is_finite() {
-                    return Err(WindowError::NotFinite);
-                }
-                if correction.nis > self.options.gate {
-                    correction.verdict = Verdict::Gated;
-                    correction.iterations = 0;
-                    return Ok(correction);
-                }
-            }
-            *steps += 1;
-            self.backward(*steps == 1)?;
-        }
-        Ok(correction)
-    }
-
-    /// The Kalman filter over the linearised window.
-    fn forward(&mut self) -> Result<(), WindowError> {
-        let fresh = self.must_linearise();
-        let constant = self.is_constant();
-        let affine = self.is_affine();
-        let jacobians = self.options.jacobians;
-        let last = self.knots.len() - 1;
-        let mut before: Option<(G, SVector<f64, D>)> = None;
-        let mut filtered = self.knots[0].filtered;
-        let states = self.knots.iter_mut().zip(&mut self.passages);
-        for (index, (knot, passage)) in states.enumerate() {
-            let mean = match &before {
-                None if fresh => {
-                    let prior = self.prior.at::<S>(&knot.chi);
-                    passage.predicted = prior.covariance;
-                    prior.mean
-                }
-                None => self.prior.mean_at::<S>(&knot.chi),
-                Some((chi, correction)) if affine => {
-                    if fresh {
-                        let noise = passage.motion.noise();
-                        passage.predicted = knot.track.carry_covariance(&filtered, noise);
-                    }
-                    knot.track.carry(correction) + knot.offset::<S>(chi)
-                }
-                Some((chi, correction)) => {
-                    let offset = passage.link::<S>(chi, &knot.chi, &filtered, jacobians);
-                    passage.transition * correction + offset
-                }
-            };
-            if fresh || index == last {
-                if !knot.weigh(&passage.predicted) {
-                    self.gains_hold = false;
-                    return Err(WindowError::InnovationNotPositiveDefinite);
-                }
-                filtered = knot.filtered;
-            }
-            knot.correct(mean);
-            before = Some((knot.chi, knot.correction));
-        }
-        self.gains_hold = constant;
-        Ok(())
-    }
-
-    /// The disturbance smoother, and the step of all estimates; the `first` of an update keeps what they were.
-    fn backward(&mut self, first: bool) -> Result<(), WindowError> {
-        let affine = self.is_affine();
-        let mut adjoint = SVector::<f64, D>::zeros();
-        let mut sum = 0.0;
-        for (knot, passage) in self.knots.iter_mut().zip(&self.passages).rev() {
-            let start = knot.smooth(adjoint);
-            sum += knot.correction.sum();
-            adjoint = if affine {
-                knot.track.carry_back(&start)
-            } else {
-                passage.transition.tr_mul(&start)
-            };
-            let xi = if S::IS_LEFT {
-                knot.correction
-            } else {
-                S::from_left(&knot.chi) * knot.correction
-            };
-            if first {
-                knot.before = knot.chi;
-            }
-            knot.chi = S::retract(&knot.chi, &xi);
-        }
-        if sum.is_finite() {
-            Ok(())
-        } else {
-            Err(WindowError::NotFinite)
-        }
+    /// Whether the Jacobians of the motions' residuals are left out: then the tracks have F.
+    fn is_tracked(&self) -> bool {
+        self.options.jacobians == Jacobians::Frozen
     }
 
     /// Whether the linearised motions are the same at all estimates, but for their offsets.
     fn is_affine(&self) -> bool {
-        G::IS_GROUP_AFFINE && S::Residual::IS_LEFT && self.options.jacobians == Jacobians::Frozen
+        G::IS_GROUP_AFFINE && S::Residual::IS_LEFT && self.is_tracked()
     }
 
     /// Whether nothing that enters the covariances depends on the estimates.
@@ -415,25 +344,5 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     /// Whether the next push makes the oldest state leave.
     pub fn is_full(&self) -> bool {
         self.knots.len() >= self.options.capacity
-    }
-
-    /// State `index`, oldest 0, with the covariance of its left-invariant error given all fixes, before and
-    /// after; `None` beyond the newest. Matrix products for each later state: for reports, not for each sample.
-    pub fn smoothed(&self, index: usize) -> Option<Belief<G, Left, D>> {
-        let knot = self.knots.get(index)?;
-        let mut information = SMatrix::<f64, D, D>::zeros();
-        let later = self.knots.range(index + 1..);
-        for (later, passage) in later.zip(self.passages.range(index + 1..)).rev() {
-            let start = later.information(&information);
-            let transition = if self.is_affine() {
-                later.track.matrix()
-            } else {
-                passage.transition
-            };
-            information = transition.tr_mul(&start) * transition;
-        }
-        let p = knot.filtered.matrix();
-        let covariance = Covariance::from_upper(p - p * information * p);
-        Some(Belief::new(knot.chi, covariance))
     }
 }

@@ -187,41 +187,40 @@ fn in_the_linear_case_the_newest_state_is_the_kalman_filters() {
     }
 }
 
-/// Covariances of constant gains need no states: those of all states, given all fixes, from the joint covariance of
-/// the whole chain.
-#[test]
-fn smoothed_covariances_are_those_of_the_joint_distribution() {
-    let states = 8;
-    let drive = Drive::<SE23, 9>::new(states - 1, 0.2, ISOTROPIC, 15);
-    let mut window = Window::<SE23, Left, 9>::new(&drive.first, &WindowOptions::new(states));
+/// Those of all states, given all fixes, from the joint covariance of the whole chain as it was linearised last.
+fn assert_covariances_are_joint<G: InertialState<D>, const D: usize>(states: usize) {
+    let drive = Drive::<G, D>::new(states - 1, 0.2, ISOTROPIC, 15);
+    let mut window = Window::<G, Left, D>::new(&drive.first, &WindowOptions::new(states));
+    let mut linearised: Vec<G> = Vec::new();
     for (motion, fix) in &drive.seconds {
         window.push(motion);
+        linearised = window.states().copied().collect();
         window.update(*fix).expect("an update");
     }
 
-    let n = 9 * states;
+    let n = D * states;
     let mut joint = DMatrix::<f64>::zeros(n, n);
     joint
-        .view_mut((0, 0), (9, 9))
+        .view_mut((0, 0), (D, D))
         .copy_from(drive.first.covariance.matrix());
     for (i, (motion, _)) in drive.seconds.iter().enumerate() {
-        let f = motion.motion().step.left_jacobian();
-        let f = DMatrix::from_column_slice(9, 9, f.as_slice());
-        let end = 9 * (i + 1);
-        let across = &f * joint.view((end - 9, 0), (9, end));
+        let f = motion.transition(&linearised[i]).1;
+        let f = DMatrix::from_column_slice(D, D, f.as_slice());
+        let end = D * (i + 1);
+        let across = &f * joint.view((end - D, 0), (D, end));
         let q = motion.noise().matrix();
-        let q = DMatrix::from_column_slice(9, 9, q.as_slice());
-        let own = across.view((0, end - 9), (9, 9)) * f.transpose() + q;
-        joint.view_mut((end, 0), (9, end)).copy_from(&across);
+        let q = DMatrix::from_column_slice(D, D, q.as_slice());
+        let own = across.view((0, end - D), (D, D)) * f.transpose() + q;
+        joint.view_mut((end, 0), (D, end)).copy_from(&across);
         joint
-            .view_mut((0, end), (end, 9))
+            .view_mut((0, end), (end, D))
             .copy_from(&across.transpose());
-        joint.view_mut((end, end), (9, 9)).copy_from(&own);
+        joint.view_mut((end, end), (D, D)).copy_from(&own);
     }
     let m = 3 * (states - 1);
     let mut h = DMatrix::<f64>::zeros(m, n);
     for i in 1..states {
-        let (row, column) = (3 * (i - 1), 9 * i);
+        let (row, column) = (3 * (i - 1), D * i);
         let arm = LEVER_ARM_B.cross_matrix();
         h.view_mut((row, column), (3, 3)).copy_from(&-arm);
         h.view_mut((row, column + 6), (3, 3))
@@ -231,11 +230,24 @@ fn smoothed_covariances_are_those_of_the_joint_distribution() {
     let k = &joint * h.transpose() * s.try_inverse().expect("positive definite");
     let given_all = &joint - k * h * &joint;
 
-    for i in 0..states {
-        let expected: SMatrix<f64, 9, 9> = given_all.fixed_view::<9, 9>(9 * i, 9 * i).into();
-        let smoothed = window.smoothed(i).expect("a state");
-        assert_same_covariance("smoothed", smoothed.covariance.matrix(), &expected, 1e-7);
-    }
+    let mut seen = 0;
+    window.covariances(&mut |i, covariance| {
+        let expected: SMatrix<f64, D, D> = given_all.fixed_view::<D, D>(D * i, D * i).into();
+        assert_same_covariance("smoothed", covariance.matrix(), &expected, 1e-7);
+        assert_eq!(
+            window.smoothed(i).map(|state| state.covariance),
+            Some(*covariance)
+        );
+        seen += 1;
+    });
+    assert_eq!(seen, states);
     assert_eq!(window.smoothed(states - 1), Some(window.newest()));
     assert_eq!(window.smoothed(states), None);
+    assert_eq!(window.smoothed(0), Some(window.oldest()));
+}
+
+#[test]
+fn smoothed_covariances_are_those_of_the_joint_distribution() {
+    assert_covariances_are_joint::<SE23, 9>(8);
+    assert_covariances_are_joint::<NavState, 15>(8);
 }

@@ -12,8 +12,12 @@ use std::time::Instant;
 
 use crate::common::{GRAVITY_W, NOISE, any_belief, normal, seeded};
 
-/// The least mean time of a push and an update over some blocks, s, in a window that is full.
-fn cost_s<G: InertialState<D>, const D: usize>(capacity: usize, covariance_w: Matrix3<f64>) -> f64 {
+/// The least mean time of a push and an update over so many blocks, s, in a window that is full.
+fn cost_s<G: InertialState<D>, const D: usize>(
+    capacity: usize,
+    covariance_w: Matrix3<f64>,
+    blocks: usize,
+) -> f64 {
     let mut rng = seeded(1);
     let noise = ImuNoise { ..NOISE };
     let start = G::from_parts(
@@ -57,7 +61,7 @@ fn cost_s<G: InertialState<D>, const D: usize>(capacity: usize, covariance_w: Ma
     block(capacity);
     // Short blocks: some of them are not interrupted.
     let updates = 1_000 / capacity + 2;
-    (0..200)
+    (0..blocks)
         .map(|_| block(updates))
         .fold(f64::INFINITY, f64::min)
 }
@@ -101,8 +105,27 @@ fn timing() {
     );
     for capacity in [1, 10, 50, 200, 1000] {
         let [constant, anew] =
-            [isotropic, anisotropic].map(|noise| 1e6 * cost_s::<SE23, 9>(capacity, noise));
-        let biased = 1e6 * cost_s::<NavState, 15>(capacity, isotropic);
+            [isotropic, anisotropic].map(|noise| 1e6 * cost_s::<SE23, 9>(capacity, noise, 200));
+        let biased = 1e6 * cost_s::<NavState, 15>(capacity, isotropic, 200);
         println!("{capacity:6}  {constant:14.2}  {anew:15.2}  {biased:11.2}");
     }
+}
+
+/// For an instrument that counts instructions, which do not depend on what else the machine does: what 20 blocks
+/// count more than 10, by the updates in ten.
+#[test]
+#[ignore = "for valgrind: WINDOW=50 KIND=biased BLOCKS=10 valgrind --tool=none BINARY --ignored instructions"]
+fn instructions() {
+    let number = |name: &str| std::env::var(name).ok()?.parse::<usize>().ok();
+    let (Some(capacity), Some(blocks)) = (number("WINDOW"), number("BLOCKS")) else {
+        return;
+    };
+    let anisotropic = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 2.25));
+    let kind = std::env::var("KIND").unwrap_or_default();
+    match kind.as_str() {
+        "constant" => cost_s::<SE23, 9>(capacity, Matrix3::identity(), blocks),
+        "anew" => cost_s::<SE23, 9>(capacity, anisotropic, blocks),
+        _ => cost_s::<NavState, 15>(capacity, Matrix3::identity(), blocks),
+    };
+    println!("{} updates in a block", 1_000 / capacity + 2);
 }

@@ -55,12 +55,12 @@ impl Measurement for Aiding {
 }
 
 impl Aiding {
-    /// The same for the window of a smoother, which knows no heading.
-    pub fn for_window(&self) -> Option<smoother::Fix> {
+    /// The same for the window of a smoother.
+    pub fn for_window(&self) -> smoother::Fix {
         match self {
-            Self::Position(observation) => Some((*observation).into()),
-            Self::Velocity(observation) => Some((*observation).into()),
-            Self::Heading(_) => None,
+            Self::Position(observation) => (*observation).into(),
+            Self::Velocity(observation) => (*observation).into(),
+            Self::Heading(observation) => (*observation).into(),
         }
     }
 

@@ -2,8 +2,11 @@
 
 use std::collections::VecDeque;
 
+use inekf::filter::{Belief, Covariance, Left as Side};
 use inekf::model::InertialState;
 use inekf_shared::message::{SMOOTHED_CUT, SmoothedState, Zero};
+
+use super::super::output::write_triangle;
 
 /// A bounded queue: if nobody takes the states, the oldest give way, as they do for a slow reader.
 #[derive(Debug)]
@@ -14,13 +17,14 @@ pub(super) struct Left {
     count: u64,
 }
 
-/// The state `chi` at `stamp_ns`.
+/// The state `chi` at `stamp_ns`, with its covariance.
 pub(super) fn message<G: InertialState<D>, const D: usize>(
     stamp_ns: u64,
     chi: &G,
+    covariance: &Covariance<D>,
 ) -> SmoothedState {
     let pose = chi.pose();
-    SmoothedState {
+    let mut state = SmoothedState {
         stamp_ns,
         dimension: D as u32,
         q_wb: pose.rotation.quaternion_xyzw(),
@@ -29,7 +33,9 @@ pub(super) fn message<G: InertialState<D>, const D: usize>(
         gyro_bias_rps: chi.gyro_bias().into(),
         accel_bias_mps2: chi.accel_bias().into(),
         ..SmoothedState::ZERO
-    }
+    };
+    write_triangle(&mut state.covariance, covariance);
+    state
 }
 
 impl Left {
@@ -42,15 +48,24 @@ impl Left {
     }
 
     /// A state whose time has come.
-    pub(super) fn push<G: InertialState<D>, const D: usize>(&mut self, stamp_ns: u64, chi: &G) {
-        self.add(message(stamp_ns, chi));
+    pub(super) fn push<G: InertialState<D>, const D: usize>(
+        &mut self,
+        stamp_ns: u64,
+        state: &Belief<G, Side, D>,
+    ) {
+        self.add(message(stamp_ns, &state.mean, &state.covariance));
     }
 
     /// A state that leaves before its time.
-    pub(super) fn cut<G: InertialState<D>, const D: usize>(&mut self, stamp_ns: u64, chi: &G) {
+    pub(super) fn cut<G: InertialState<D>, const D: usize>(
+        &mut self,
+        stamp_ns: u64,
+        chi: &G,
+        covariance: &Covariance<D>,
+    ) {
         self.add(SmoothedState {
             flags: SMOOTHED_CUT,
-            ..message(stamp_ns, chi)
+            ..message(stamp_ns, chi, covariance)
         });
     }
 

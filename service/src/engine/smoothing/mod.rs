@@ -3,20 +3,21 @@
 //! Each accepted fix makes a state of the window at its own stamp, a second one of that stamp a state of its own. What
 //! is published for a sample is the newest of them, moved along the samples since as a filter would: nothing of the
 //! window is touched before. Then come the fixes that are due: each is judged against the estimate at its stamp, and
-//! if it is let in the window is solved and the samples after it are gone through again.
+//! if it is let in the newest state is smoothed and the samples after it are gone through again. The other states
+//! follow in pieces of bounded work, some after each sample ([`behind`]). Where the window is not ready for a fix it
+//! corrects the estimate as a plain filter's would, and the smoothed estimate takes its place some samples later, published
+//! under the same stamp as the sample then.
 //!
-//! A fix that is late, but not older than the newest state of the window, is fused as if it had been on time,
-//! bit for bit ([`since`]); an older one is too late. A fix that comes between two samples waits for
-//! [`settle`](History::settle), or for the next sample to be out.
+//! A fix that is late, but not older than the last one, is fused as if it had been on time: once the window has seen it,
+//! the estimate is the same bit for bit ([`since`]); an older one is too late. A fix that comes between two samples waits
+//! for [`settle`](History::settle), or for the next sample to be out.
 //!
 //! A lock-out ends with a new window: it begins with the widened estimate, for what the old one believed is doubted.
 
-use std::collections::VecDeque;
-
-use inekf::filter::{Belief, Left, Transport, UpdateError, UpdateOptions, Verdict};
+use inekf::filter::{Belief, Gate, Left, Transport, UpdateError, UpdateOptions, Verdict};
 use inekf::model::{ImuInput, InertialState};
 use inekf::smoother::WindowError;
-use inekf_shared::message::SmoothedState;
+use inekf_shared::message::{NO_SOURCE, SmoothedState};
 
 use super::driver::Engine;
 use super::fix::Fix;
@@ -27,13 +28,14 @@ use super::model::{Fused, Model};
 use super::recovery::Lockout;
 use super::settings::{FusionSettings, Settings, SmootherSettings};
 
+pub mod behind;
 mod left;
+mod pace;
 pub mod since;
 pub mod window;
 
-use left::Left as LeftStates;
+use behind::{Behind, Effort};
 use since::{Since, Stand};
-use window::AnyWindow;
 
 /// A fix that waits.
 #[derive(Clone, Copy, Debug)]
@@ -43,22 +45,27 @@ struct Waiting {
     late: bool,
 }
 
-/// The window, what has moved since its newest state, and the fixes that wait.
+/// The estimate, the window behind it, and the fixes that wait.
 #[derive(Debug)]
 pub struct Smoothing<G, const D: usize> {
     late_window_ns: u64,
-    /// How a fix is judged before it is let into the window.
+    /// How a fix is judged, and corrects the estimate.
     judging: UpdateOptions,
-    window: Box<dyn AnyWindow<G, D>>,
-    /// Of the states in the window, oldest first; empty before the start.
-    stamps: VecDeque<u64>,
-    /// Whether a fix has been given to the newest of them.
-    is_seen: bool,
+    behind: Behind<G, D>,
     since: Since<G, D>,
+    /// Source of the last fix.
+    source: u32,
     /// Sorted by [`Fix::order`].
     waiting: Vec<Waiting>,
     lockout: Lockout,
-    left: LeftStates,
+}
+
+/// What the counters know.
+fn update_error(error: WindowError) -> UpdateError {
+    match error {
+        WindowError::InnovationNotPositiveDefinite => UpdateError::InnovationNotPositiveDefinite,
+        WindowError::NotFinite | WindowError::AlreadySeen => UpdateError::NotFinite,
+    }
 }
 
 /// An engine of the model `imu` that smooths.
@@ -70,6 +77,11 @@ impl<G: InertialState<D> + 'static, const D: usize> SmoothingEngine<G, D> {
         let history = Smoothing::new(&settings.fusion, smoother);
         Self::with_history(Inertial::new(&settings), settings.fusion, history)
     }
+
+    /// How the smoothing keeps up with the samples.
+    pub fn effort(&self) -> Effort {
+        self.history().behind.effort()
+    }
 }
 
 impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
@@ -78,7 +90,6 @@ impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
     where
         G: 'static,
     {
-        let capacity = smoother.window.capacity.max(1);
         Self {
             late_window_ns: fusion.late_window_ns,
             judging: UpdateOptions {
@@ -86,91 +97,58 @@ impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
                 transport: Transport::None,
                 ..fusion.update
             },
-            window: window::of(smoother),
-            stamps: VecDeque::with_capacity(capacity + 1),
-            is_seen: false,
+            behind: Behind::new(smoother),
             since: Since::new(fusion),
+            source: NO_SOURCE,
             waiting: Vec::with_capacity(MAX_FIXES),
             lockout: Lockout::new(fusion.recover_after),
-            left: LeftStates::new(capacity + MAX_FIXES),
         }
     }
 
-    /// Begins the window anew with one state; those in it leave.
-    fn begin(&mut self, stamp_ns: u64, first: &Belief<G, Left, D>) {
-        self.give_up_window();
-        self.window.restart(first);
-        self.stamps.push_back(stamp_ns);
-        self.is_seen = false;
-    }
-
-    /// Lets every state leave as it is.
-    fn give_up_window(&mut self) {
-        let Self {
-            window,
-            stamps,
-            left,
-            ..
-        } = self;
-        let mut states = stamps.iter();
-        window.each(&mut |chi| {
-            if let Some(&stamp_ns) = states.next() {
-                left.cut(stamp_ns, chi);
-            }
-        });
-        stamps.clear();
-    }
-
-    /// Makes a state of the window where the estimate stands, unless the newest one is there and unseen.
-    fn reach(&mut self, stand: &Stand<G, D>) {
-        if !self.is_seen && self.stamps.back() == Some(&stand.stamp_ns) {
-            return;
+    /// Has the window see all fixes at once, and takes its estimate over.
+    fn catch_up(&mut self, model: &Inertial<G, Left, D>) {
+        if let Some(ready) = self.behind.catch_up(model, &self.since) {
+            self.since.take_over(&ready);
         }
-        if let Some(chi) = self.window.push(&stand.motion)
-            && let Some(stamp_ns) = self.stamps.pop_front()
-        {
-            self.left.push(stamp_ns, &chi);
-        }
-        self.stamps.push_back(stand.stamp_ns);
-        self.is_seen = false;
     }
 
-    /// Takes a fix whose time has come into the window, or gates it.
+    /// Corrects the estimate with a fix whose time has come, and hands it to the window; or gates it.
     fn judge(
         &mut self,
         model: &Inertial<G, Left, D>,
         fix: &Fix<Aiding>,
     ) -> Result<Fused, UpdateError> {
-        let stand = self.since.at(model, fix.stamp_ns);
-        let Some(observation) = fix.measurement.for_window() else {
-            return Err(UpdateError::NotFinite);
-        };
-        let outcome = fix
-            .measurement
-            .fuse(&mut stand.belief.clone(), &self.judging);
-        match (self.lockout.broken_by(fix, &outcome), outcome) {
-            (Some(nis), _) => {
-                let widening = model.widening(&stand.belief, fix, nis);
-                let wide = fix.measurement.widened(&stand.belief, &widening);
-                self.begin(fix.stamp_ns, &wide);
-            }
-            (None, Ok(fused)) if fused.verdict == Verdict::Accepted => self.reach(&stand),
-            (None, refused) => return refused,
+        let seen = fix.measurement.for_window();
+        if self.behind.is_full() {
+            self.catch_up(model);
         }
-        let corrected = self.window.update(observation);
-        self.is_seen = corrected.is_ok();
-        let newest = self.window.newest();
-        self.since.restart(model, fix.stamp_ns, &newest);
-        let corrected = corrected.map_err(|error| match error {
-            WindowError::InnovationNotPositiveDefinite => {
-                UpdateError::InnovationNotPositiveDefinite
+        let mut stand = self.since.at(model, fix.stamp_ns);
+        let mut belief = stand.belief;
+        let mut outcome = fix.measurement.fuse(&mut belief, &self.judging);
+        if let Some(nis) = self.lockout.broken_by(fix, &outcome) {
+            self.catch_up(model);
+            let widening = model.widening(&stand.belief, fix, nis);
+            let wide = fix.measurement.widened(&stand.belief, &widening);
+            self.behind.begin(fix.stamp_ns, &wide);
+            stand = Stand::new(fix.stamp_ns, &wide);
+            belief = wide;
+            let open = UpdateOptions {
+                gate: Gate::OPEN,
+                ..self.judging
+            };
+            outcome = fix.measurement.fuse(&mut belief, &open);
+        }
+        let fused = outcome?;
+        if fused.verdict == Verdict::Accepted {
+            self.source = fix.source;
+            if self.behind.is_ready_for(fix.stamp_ns, &seen) {
+                belief = self.behind.lead(&stand, seen).map_err(update_error)?;
+            } else {
+                self.behind.add(&stand, seen);
             }
-            WindowError::NotFinite | WindowError::AlreadySeen => UpdateError::NotFinite,
-        })?;
-        Ok(Fused {
-            verdict: Verdict::Accepted,
-            nis: outcome.map_or(corrected.nis, |fused| fused.nis),
-        })
+            self.since.restart(model, fix.stamp_ns, &belief);
+        }
+        Ok(fused)
     }
 
     /// Judges the fixes that are due.
@@ -199,14 +177,22 @@ impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
 }
 
 impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoothing<G, D> {
-    fn start(&mut self, stamp_ns: u64, input: Option<ImuInput>, state: Belief<G, Left, D>) {
-        self.clear();
-        self.begin(stamp_ns, &state);
+    fn start(
+        &mut self,
+        model: &Inertial<G, Left, D>,
+        stamp_ns: u64,
+        input: Option<ImuInput>,
+        state: Belief<G, Left, D>,
+    ) {
+        self.clear(model);
+        self.behind.begin(stamp_ns, &state);
         self.since.start(stamp_ns, input, &state);
     }
 
-    fn clear(&mut self) {
-        self.give_up_window();
+    fn clear(&mut self, model: &Inertial<G, Left, D>) {
+        // The states that leave are to have seen every fix.
+        self.behind.catch_up(model, &self.since);
+        self.behind.give_up();
         self.waiting.clear();
         self.lockout.clear();
     }
@@ -217,11 +203,13 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
 
     fn newest(&self) -> Option<(u64, &Belief<G, Left, D>)> {
         let newest = self.since.newest();
-        (!self.stamps.is_empty()).then_some((newest.stamp_ns, &newest.belief))
+        self.behind
+            .has_begun()
+            .then_some((newest.stamp_ns, &newest.belief))
     }
 
     fn awaits_input_at(&self, stamp_ns: u64) -> bool {
-        !self.stamps.is_empty() && self.since.awaits_input_at(stamp_ns)
+        self.behind.has_begun() && self.since.awaits_input_at(stamp_ns)
     }
 
     fn set_input(&mut self, input: ImuInput) {
@@ -235,7 +223,7 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
         input: ImuInput,
         mut emit: impl FnMut(Event<'_, Belief<G, Left, D>, Aiding>),
     ) -> Result<(), Breakdown> {
-        if self.stamps.is_empty() {
+        if !self.behind.has_begun() {
             return Err(Breakdown);
         }
         let (motion, state) = self.since.step(model, stamp_ns, &input);
@@ -246,9 +234,20 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
             stamp_ns,
             state: &state,
         });
+        if self.since.is_full() {
+            self.catch_up(model);
+        }
         self.since.push(model, stamp_ns, input, &motion, &state);
         self.judge_due(model, &mut emit);
-        self.since.forget_old(model);
+        if let Some(ready) = self.behind.keep_up(model, &self.since) {
+            self.since.take_over(&ready);
+            emit(Event::Smoothed {
+                stamp_ns,
+                state: &self.since.newest().belief,
+                source: self.source,
+            });
+        }
+        self.since.forget_old(model, self.behind.needs_from_ns());
         Ok(())
     }
 
@@ -261,7 +260,7 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
         let now_ns = self.since.newest().stamp_ns;
         let is_too_late = now_ns.saturating_sub(fix.stamp_ns) > self.late_window_ns
             || fix.stamp_ns < self.since.oldest_ns();
-        if self.stamps.is_empty() || is_too_late {
+        if !self.behind.has_begun() || is_too_late {
             return Insertion::TooLate;
         }
         if self.waiting.len() >= MAX_FIXES {
@@ -284,21 +283,15 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
     }
 
     fn take_left(&mut self) -> Option<SmoothedState> {
-        self.left.take()
+        self.behind.take_left()
     }
 
-    fn smoothed(&self, give: &mut dyn FnMut(&SmoothedState)) -> Option<usize> {
-        let count = self.stamps.len();
-        let mut states = self.stamps.iter().enumerate();
-        self.window.each(&mut |chi| {
-            if let Some((index, &stamp_ns)) = states.next() {
-                give(&SmoothedState {
-                    index: index as u64,
-                    count: count as u64,
-                    ..left::message(stamp_ns, chi)
-                });
-            }
-        });
-        Some(count)
+    fn smoothed(
+        &mut self,
+        model: &Inertial<G, Left, D>,
+        give: &mut dyn FnMut(&SmoothedState),
+    ) -> Option<usize> {
+        self.behind.run_ahead(model, &self.since);
+        Some(self.behind.each(give))
     }
 }

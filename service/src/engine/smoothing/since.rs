@@ -5,7 +5,8 @@
 //! a late fix may go back to, at the last but one, at the last. Wherever a walk begins, it takes the same steps,
 //! sample by sample: its end is the same bit for bit.
 //!
-//! The samples are bounded in number and in time: the motion over those that are forgotten is in the oldest stand.
+//! The samples are bounded in number and in time: the motion over those that are forgotten is in the oldest stand. Those
+//! that the window has still to follow are kept as well.
 
 use std::collections::VecDeque;
 
@@ -16,7 +17,13 @@ use inekf::smoother::Preintegration;
 use super::super::inertial::{ImuMotion, Inertial};
 use super::super::model::Model;
 use super::super::settings::FusionSettings;
+use super::behind::Ready;
 use super::window::nowhere;
+
+/// Samples that the window may be behind.
+const MAX_BEHIND: usize = 4096;
+/// Samples that are forgotten after each: two, for their number to fall.
+const FORGOTTEN_AT_ONCE: usize = 2;
 
 /// An estimate, and the motion that led to it from the newest state of the window.
 #[derive(Clone, Copy, Debug)]
@@ -30,8 +37,11 @@ pub struct Stand<G, const D: usize> {
 }
 
 impl<G: InertialState<D>, const D: usize> Stand<G, D> {
+    /// Units of work of one sample, as those of [`Window`](inekf::smoother::Window).
+    pub const WORK: i64 = 2 + (D * D / 12) as i64;
+
     /// At a state of the window.
-    fn new(stamp_ns: u64, belief: &Belief<G, Left, D>) -> Self {
+    pub(super) fn new(stamp_ns: u64, belief: &Belief<G, Left, D>) -> Self {
         Self {
             stamp_ns,
             belief: *belief,
@@ -60,7 +70,7 @@ struct Sample {
 pub struct Since<G, const D: usize> {
     late_window_ns: u64,
     capacity: usize,
-    /// The first is the last one at or before the oldest stand.
+    /// One at least is not after the oldest stand.
     samples: VecDeque<Sample>,
     oldest: Stand<G, D>,
     /// At the last sample but one, or where the motion began after it.
@@ -76,7 +86,7 @@ impl<G: InertialState<D>, const D: usize> Since<G, D> {
         Self {
             late_window_ns: fusion.late_window_ns,
             capacity,
-            samples: VecDeque::with_capacity(capacity + 1),
+            samples: VecDeque::with_capacity(capacity + MAX_BEHIND + 1),
             oldest: stand,
             previous: stand,
             newest: stand,
@@ -151,10 +161,11 @@ impl<G: InertialState<D>, const D: usize> Since<G, D> {
             stamp_ns,
             input: Some(input),
         });
-        // Never beyond what was allocated; forget_old keeps to the bound in time as well.
-        if self.samples.len() > self.capacity {
-            self.forget_oldest(model);
-        }
+    }
+
+    /// Whether there is no room for another sample.
+    pub fn is_full(&self) -> bool {
+        self.samples.len() >= self.capacity + MAX_BEHIND
     }
 
     /// The estimate at `stamp_ns`, which lies between the oldest stand and the newest.
@@ -166,16 +177,13 @@ impl<G: InertialState<D>, const D: usize> Since<G, D> {
         self.walk(model, from, stamp_ns)
     }
 
-    /// The newest state of the window is now `belief` at `stamp_ns`: goes through the samples after it.
+    /// The estimate is now `belief` at `stamp_ns`: goes through the samples after it.
     pub fn restart(
         &mut self,
         model: &Inertial<G, Left, D>,
         stamp_ns: u64,
         belief: &Belief<G, Left, D>,
     ) {
-        while self.samples.len() > 1 && self.samples[1].stamp_ns <= stamp_ns {
-            self.samples.pop_front();
-        }
         self.oldest = Stand::new(stamp_ns, belief);
         let last_but_one_ns = match self.samples.len() {
             0 | 1 => stamp_ns,
@@ -185,29 +193,57 @@ impl<G: InertialState<D>, const D: usize> Since<G, D> {
         self.newest = self.walk(model, &self.previous, u64::MAX);
     }
 
-    /// Forgets the samples that no late fix may go back to. The last two stay.
-    pub fn forget_old(&mut self, model: &Inertial<G, Left, D>) {
-        while self.samples.len() > 2
-            && self.newest.stamp_ns - self.samples[1].stamp_ns > self.late_window_ns
-        {
-            self.forget_oldest(model);
+    /// The estimate is now the smoothed one.
+    pub(super) fn take_over(&mut self, ready: &Ready<G, D>) {
+        (self.oldest, self.previous, self.newest) = (ready.anchor, ready.previous, ready.newest);
+    }
+
+    /// Forgets some of the samples that no late fix may go back to and that are before `needed_ns`. The last two stay.
+    pub fn forget_old(&mut self, model: &Inertial<G, Left, D>, needed_ns: Option<u64>) {
+        for _ in 0..FORGOTTEN_AT_ONCE {
+            let next = self.after(self.oldest.stamp_ns);
+            let later = self.samples.len() - next;
+            let is_old = |sample: &Sample| {
+                self.newest.stamp_ns - sample.stamp_ns > self.late_window_ns
+                    || later >= self.capacity
+            };
+            match self.samples.get(next) {
+                Some(sample) if later > 1 && is_old(sample) => {
+                    self.oldest = self.walk(model, &self.oldest, sample.stamp_ns);
+                }
+                _ => break,
+            }
+        }
+        let needed_ns = needed_ns.map_or(self.oldest.stamp_ns, |ns| ns.min(self.oldest.stamp_ns));
+        while self.samples.len() > 2 && self.samples[1].stamp_ns <= needed_ns {
+            self.samples.pop_front();
         }
     }
 
-    fn forget_oldest(&mut self, model: &Inertial<G, Left, D>) {
-        let Some(next) = self.samples.get(1) else {
-            return;
-        };
-        self.oldest = self.walk(model, &self.oldest, next.stamp_ns);
-        self.samples.pop_front();
+    /// The index of the first sample after `stamp_ns`.
+    fn after(&self, stamp_ns: u64) -> usize {
+        self.samples
+            .partition_point(|sample| sample.stamp_ns <= stamp_ns)
+    }
+
+    /// From a stand along one sample, or up to `until_ns`; where there is no later one, the same.
+    pub fn step_on(
+        &self,
+        model: &Inertial<G, Left, D>,
+        from: &Stand<G, D>,
+        until_ns: u64,
+    ) -> Stand<G, D> {
+        let next = self.samples.get(self.after(from.stamp_ns));
+        match next {
+            Some(next) => self.walk(model, from, next.stamp_ns.min(until_ns)),
+            None => *from,
+        }
     }
 
     /// From a stand along the samples, up to `stamp_ns` or the last of them.
     fn walk(&self, model: &Inertial<G, Left, D>, from: &Stand<G, D>, stamp_ns: u64) -> Stand<G, D> {
         let mut stand = *from;
-        let next = self
-            .samples
-            .partition_point(|sample| sample.stamp_ns <= stand.stamp_ns);
+        let next = self.after(stand.stamp_ns);
         for (before, after) in (next.max(1)..self.samples.len())
             .map(|index| (&self.samples[index - 1], &self.samples[index]))
         {

@@ -16,14 +16,41 @@ pub trait AnyWindow<G, const D: usize>: Debug {
     /// [`Window::restart`].
     fn restart(&mut self, first: &Belief<G, Left, D>);
 
-    /// [`Window::push`].
-    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G>;
+    /// [`Window::push`]; with the covariance of the state that leaves.
+    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<Belief<G, Left, D>>;
 
-    /// [`Window::update`].
+    /// [`Window::is_full`].
+    fn is_full(&self) -> bool;
+
+    /// [`Window::cover_oldest`].
+    fn cover_oldest(&mut self, budget: &mut i64) -> bool;
+
+    /// Hands over [`Window::covariances`].
+    fn covariances(&self, give: &mut dyn FnMut(usize, &Covariance<D>));
+
+    /// [`Window::begin`].
     ///
     /// # Errors
     /// As there.
-    fn update(&mut self, fix: Fix) -> Result<WindowCorrection, WindowError>;
+    fn begin(&mut self, fix: Fix) -> Result<(), WindowError>;
+
+    /// [`Window::is_ready_for`].
+    fn is_ready_for(&self, fix: &Fix) -> bool;
+
+    /// [`Window::lead`].
+    fn lead(&mut self) -> Option<Result<WindowCorrection, WindowError>>;
+
+    /// [`Window::anticipate`].
+    fn anticipate(&mut self, budget: &mut i64) -> bool;
+
+    /// [`Window::advance`].
+    fn advance(&mut self, budget: &mut i64) -> Option<Result<WindowCorrection, WindowError>>;
+
+    /// [`Window::work`].
+    fn work(&self) -> i64;
+
+    /// [`Window::work_of_push`].
+    fn work_of_push(&self) -> i64;
 
     /// [`Window::newest`].
     fn newest(&self) -> Belief<G, Left, D>;
@@ -37,12 +64,50 @@ impl<G: InertialState<D>, S: Side, const D: usize> AnyWindow<G, D> for Window<G,
         Self::restart(self, first);
     }
 
-    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
-        Self::push(self, motion)
+    fn push(&mut self, motion: &Preintegration<G, D>) -> Option<Belief<G, Left, D>> {
+        let leaving = self.is_full().then(|| self.oldest());
+        Self::push(self, motion);
+        leaving
     }
 
-    fn update(&mut self, fix: Fix) -> Result<WindowCorrection, WindowError> {
-        Self::update(self, fix)
+    fn is_full(&self) -> bool {
+        Self::is_full(self)
+    }
+
+    fn cover_oldest(&mut self, budget: &mut i64) -> bool {
+        Self::cover_oldest(self, budget)
+    }
+
+    fn covariances(&self, give: &mut dyn FnMut(usize, &Covariance<D>)) {
+        Self::covariances(self, give);
+    }
+
+    fn begin(&mut self, fix: Fix) -> Result<(), WindowError> {
+        Self::begin(self, fix)
+    }
+
+    fn is_ready_for(&self, fix: &Fix) -> bool {
+        Self::is_ready_for(self, fix)
+    }
+
+    fn lead(&mut self) -> Option<Result<WindowCorrection, WindowError>> {
+        Self::lead(self)
+    }
+
+    fn anticipate(&mut self, budget: &mut i64) -> bool {
+        Self::anticipate(self, budget)
+    }
+
+    fn advance(&mut self, budget: &mut i64) -> Option<Result<WindowCorrection, WindowError>> {
+        Self::advance(self, budget)
+    }
+
+    fn work(&self) -> i64 {
+        Self::work(self)
+    }
+
+    fn work_of_push(&self) -> i64 {
+        Self::work_of_push(self)
     }
 
     fn newest(&self) -> Belief<G, Left, D> {

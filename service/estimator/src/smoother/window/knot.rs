@@ -5,7 +5,8 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::Fix;
-use super::track::Track;
+use super::fix::HeadingRow;
+use super::track::{InputJacobian, Track};
 use crate::filter::{Covariance, Side};
 use crate::model::InertialState;
 use crate::smoother::linearise;
@@ -18,6 +19,8 @@ pub(super) struct FixGain<const D: usize> {
     pub gain: SMatrix<f64, D, 3>,
     /// Inverse of the innovation covariance.
     pub weight: Matrix3<f64>,
+    /// What depends on the estimate in H.
+    pub row: HeadingRow,
 }
 
 /// How a state was reached: what is read only where gains are computed.
@@ -25,30 +28,42 @@ pub(super) struct FixGain<const D: usize> {
 pub(super) struct Passage<G, const D: usize> {
     /// The motion from the state before; without meaning for the oldest state.
     pub motion: Preintegration<G, D>,
-    /// F of the motion, where it is not group-affine with frozen Jacobians: there the track has it.
+    /// F of the motion with its exact Jacobians; with frozen ones the track has it.
     pub transition: SMatrix<f64, D, D>,
-    /// Covariance given all that was before this state.
+    /// B of the motion, where the state has biases and the Jacobians are frozen.
+    pub inputs: InputJacobian,
+    /// Covariance given all that was before this state: kept up to date where gains are constants, and for the
+    /// newest state.
     pub predicted: Covariance<D>,
 }
 
 impl<G: InertialState<D>, const D: usize> Passage<G, D> {
-    /// The motion from `before` to `chi` linearised anew: keeps F, and the covariance after it from the `filtered`
-    /// one before it. Gives the offset.
+    /// The motion from `before`, linearised there with a frozen Jacobian of its residual. Keeps B; gives the rest.
+    pub fn track(&mut self, before: &G) -> Track {
+        if G::IS_GROUP_AFFINE {
+            return Track::new(&self.motion.motion().step);
+        }
+        let motion = self.motion.motion_of(before);
+        self.inputs = motion.input_jacobian;
+        Track::new(&motion.step)
+    }
+
+    /// The motion from `before` to `chi` linearised with exact Jacobians: keeps F. Gives the offset and, from the
+    /// `filtered` covariance before it, the one after.
     pub fn link<S: Side>(
         &mut self,
         before: &G,
         chi: &G,
         filtered: &Covariance<D>,
-        jacobians: Jacobians,
-    ) -> SVector<f64, D> {
+    ) -> (SVector<f64, D>, Covariance<D>) {
         let link = Link {
             motion: self.motion,
             noise: *self.motion.noise().matrix(),
         };
-        let linear = linearise::motion::<G, S, _, D>(&link, before, chi, jacobians);
+        let linear = linearise::motion::<G, S, _, D>(&link, before, chi, Jacobians::Exact);
         self.transition = linear.transition;
-        self.predicted = filtered.transformed(&linear.transition).plus(&linear.noise);
-        linear.offset
+        let carried = filtered.transformed(&linear.transition);
+        (linear.offset, carried.plus(&linear.noise))
     }
 }
 
@@ -59,7 +74,7 @@ pub(super) struct Knot<G, const D: usize> {
     pub chi: G,
     /// The estimate before the update that is under way.
     pub before: G,
-    /// The motion from the state before, if it is group-affine.
+    /// The motion from the state before, where its Jacobian is frozen.
     pub track: Track,
     pub fix: Option<Fix>,
     /// Present if there is a fix and its gain has been computed.
@@ -97,34 +112,40 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         self.filtered = passage.predicted;
     }
 
-    /// The offset of a group-affine motion from `before`, `xi = F xi_before + offset + w`, with frozen Jacobians:
+    /// The offset of the motion from `before`, `xi = F xi_before + offset + w`, with frozen Jacobians:
     /// minus `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
     pub fn offset<S: Side>(&self, before: &G) -> SVector<f64, D> {
-        -S::Residual::difference(&self.track.apply(before), &self.chi)
+        let expected = self.track.apply(before);
+        let residual = S::Residual::difference(&expected, &self.chi);
+        if S::Residual::IS_LEFT {
+            -residual
+        } else {
+            -(S::Residual::to_left(&expected) * residual)
+        }
     }
 
-    /// The gain, and the covariance after the fix. `false` if the innovation covariance is not positive
-    /// definite.
-    pub fn weigh(&mut self, predicted: &Covariance<D>) -> bool {
+    /// The gain, and the covariance after the fix, where `filtered` is the one before it. `false` if the innovation
+    /// covariance is not positive definite.
+    pub fn weigh(&mut self) -> bool {
         let Some(fix) = &self.fix else {
             self.gain = None;
-            self.filtered = *predicted;
             return true;
         };
         let noise = fix.covariance_b(&self.chi);
-        let h = fix.jacobian();
-        let p_ht = predicted.times_transposed(&h);
+        let row = fix.heading_row(&self.chi);
+        let h = fix.jacobian(&row);
+        let p_ht = fix.covariance_with(&self.filtered, &row);
         let mut innovation = noise;
         for axis in 0..3 {
-            innovation +=
-                fix.seen(&p_ht.column(axis).into_owned()) * Vector3::ith(axis, 1.0).transpose();
+            let seen = fix.seen(&p_ht.column(axis).into_owned(), &row);
+            innovation += seen * Vector3::ith(axis, 1.0).transpose();
         }
         let Some(weight) = inverse(&innovation) else {
             return false;
         };
         let gain = p_ht * weight;
-        self.filtered = predicted.corrected(&gain, &h, &noise);
-        self.gain = Some(FixGain { gain, weight });
+        self.filtered = self.filtered.corrected_with(&p_ht, &gain, &h, &noise);
+        self.gain = Some(FixGain { gain, weight, row });
         true
     }
 
@@ -132,7 +153,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     pub fn correct(&mut self, predicted: SVector<f64, D>) {
         self.correction = predicted;
         if let (Some(fix), Some(gain)) = (&self.fix, &self.gain) {
-            self.innovation = fix.residual_b(&self.chi) - fix.seen(&predicted);
+            self.innovation = fix.residual_b(&self.chi) - fix.seen(&predicted, &gain.row);
             self.weighted = gain.weight * self.innovation;
             self.correction += gain.gain * self.innovation;
         }
@@ -144,7 +165,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         match (&self.fix, &self.gain) {
             (Some(fix), Some(gain)) => {
                 let weight = self.weighted - gain.gain.tr_mul(&adjoint);
-                fix.add_transposed(adjoint, &weight)
+                fix.add_transposed(adjoint, &weight, &gain.row)
             }
             _ => adjoint,
         }
@@ -154,9 +175,10 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     pub fn information(&self, end: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
         match (&self.fix, &self.gain) {
             (Some(fix), Some(gain)) => {
-                let h = fix.jacobian::<D>();
-                let rest = SMatrix::identity() - gain.gain * h;
-                rest.transpose() * end * rest + h.transpose() * gain.weight * h
+                let h = fix.jacobian::<D>(&gain.row);
+                let by_gain = end * gain.gain;
+                let inner = gain.gain.tr_mul(&by_gain) + gain.weight;
+                end + h.tr_mul(&(inner * h - by_gain.transpose())) - by_gain * h
             }
             _ => *end,
         }

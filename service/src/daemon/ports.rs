@@ -16,6 +16,7 @@ use inekf_shared::transport::{
 };
 
 use super::fix_port::FixPort;
+use super::guard::Guard;
 use super::smoothed::SmoothedPort;
 use crate::config::WaitMode;
 use crate::engine::{Model, Outbox};
@@ -144,7 +145,7 @@ pub struct Ports<M: Model> {
     pub control: ControlServer,
     /// Woken by feeders in event mode; without a listener their notifications cost nothing.
     pub wake: Option<WakeListener>,
-    watched: Watched,
+    guard: Guard,
     node: Node,
 }
 
@@ -190,17 +191,17 @@ impl<M: Model> Ports<M> {
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,
-            watched: Watched::default(),
+            guard: Guard::default(),
             node,
         };
         // Better an error now than a SIGBUS at some later send.
         transport::reserve_shared_memory(&ports.node)?;
-        ports.watched = Watched::of(&ports.node)?;
+        ports.guard = Guard::of(Watched::of(&ports.node)?);
         Ok(ports)
     }
 
-    /// Whether everything is still there that others need in order to attach.
-    pub fn are_intact(&self) -> bool {
-        self.watched.is_intact()
+    /// Whether somebody has removed files that others need in order to attach.
+    pub fn have_lost_files(&self) -> bool {
+        self.guard.has_lost()
     }
 }

@@ -53,6 +53,9 @@ pub fn run<M: Model, H: History<M>>(
     );
     let bound = config.runtime.event_timeout();
     while !stop.load(Ordering::Relaxed) {
+        if ports.have_lost_files() {
+            return Ok(Ended::FilesGone);
+        }
         let samples = take_inputs(engine, ports)?;
         let now_ns = monotonic_ns();
         if samples > 0 {
@@ -61,9 +64,6 @@ pub fn run<M: Model, H: History<M>>(
         answer_requests(engine, ports)?;
         if watch.is_due(now_ns) {
             report(engine, ports, &mut watch, now_ns);
-            if !ports.are_intact() {
-                return Ok(Ended::FilesGone);
-            }
         }
         if samples == 0 {
             wait(ports.wake.as_ref(), bound)?;

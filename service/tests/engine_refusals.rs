@@ -3,8 +3,8 @@
 mod common;
 
 use common::{
-    EPOCH, Input, all_bits, assert_refused, circle, feed, heading, imu, isotropic, position, run,
-    settings, stamp, velocity,
+    EPOCH, Engine, Input, all_bits, assert_refused, circle, feed, heading, imu, isotropic,
+    position, run, settings, stamp, velocity,
 };
 use inekf_service::engine::tally::Refusal;
 use inekf_shared::message::{
@@ -408,4 +408,22 @@ fn fixes_that_have_nothing_to_correct_yet_are_counted_as_not_ready() {
     );
     assert_refused(engine.tally(), &[(REASON_NOT_READY, 3)]);
     assert!(estimates.is_empty());
+}
+
+#[test]
+fn what_still_waits_at_the_end_is_counted_then() {
+    let mut engine = Engine::new(settings());
+    let outbox = &mut Vec::new();
+    for k in 0..10 {
+        feed(&mut engine, &Input::Imu(imu(k)), outbox);
+    }
+    // Ahead of the samples: they wait.
+    for (number, ahead) in [1, 1_000_000, 5_000_000_000].into_iter().enumerate() {
+        let fix = position(stamp(9) + ahead, number as u64, 0);
+        feed(&mut engine, &Input::Position(fix), outbox);
+    }
+    assert_refused(engine.tally(), &[]);
+    engine.finish(outbox);
+    assert_refused(engine.tally(), &[(REASON_NOT_READY, 3)]);
+    assert_eq!(engine.tally().counters.accepted, 0);
 }

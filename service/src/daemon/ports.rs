@@ -12,6 +12,7 @@ use inekf_shared::transport::{
 };
 
 use super::fix_port::FixPort;
+use super::guard::Guard;
 use super::journal::JournalPort;
 use super::smoothed::SmoothedPort;
 use crate::config::{Config, Motion, WaitMode};
@@ -123,7 +124,7 @@ pub struct Ports<M: Model> {
     pub control: ControlServer,
     /// Woken by feeders in event mode; without a listener their notifications cost nothing.
     pub wake: Option<WakeListener>,
-    watched: Watched,
+    guard: Guard,
     node: Node,
 }
 
@@ -179,7 +180,7 @@ impl<M: Model> Ports<M> {
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,
-            watched: Watched::default(),
+            guard: Guard::default(),
             node,
         };
         // Better an error now than a SIGBUS at some later send.
@@ -193,12 +194,12 @@ impl<M: Model> Ports<M> {
     /// # Errors
     /// [`TransportError::Internal`] if the folders cannot be read.
     pub fn watch_files(&mut self) -> Result<(), TransportError> {
-        self.watched = Watched::of(&self.node)?;
+        self.guard = Guard::of(Watched::of(&self.node)?);
         Ok(())
     }
 
-    /// Whether everything is still there that others need in order to attach.
-    pub fn are_intact(&self) -> bool {
-        self.watched.is_intact()
+    /// Whether somebody has removed files that others need in order to attach.
+    pub fn have_lost_files(&self) -> bool {
+        self.guard.has_lost()
     }
 }

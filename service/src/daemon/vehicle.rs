@@ -50,8 +50,6 @@ pub struct Vehicle<'a, M: Model, H> {
     watch: Watch,
     /// Chores done so far: whose turn it is.
     turns: usize,
-    /// Somebody has removed files of the ports: what is attached goes on, but nobody can attach any more.
-    are_files_gone: bool,
 }
 
 /// A watch that begins now.
@@ -109,7 +107,6 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
             terms,
             keeper,
             turns: 0,
-            are_files_gone: false,
         }
     }
 
@@ -253,7 +250,7 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
     }
 
     fn after(&self, any_sample: bool) -> Turn {
-        match (self.are_files_gone, any_sample) {
+        match (self.ports.have_lost_files(), any_sample) {
             (true, _) => Turn::FilesGone,
             (false, true) => Turn::Busy,
             (false, false) => Turn::Idle,
@@ -267,7 +264,6 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
         }
         if self.watch.is_due(now_ns) {
             self.report(now_ns);
-            self.are_files_gone = !self.ports.are_intact();
         }
     }
 

@@ -134,6 +134,13 @@ fn a_refused_row_is_missed_like_a_lost_one() {
         assert_eq!(refused.counters.lost, 0);
         assert_eq!(refused.last().bits(), lost.last().bits());
     }
+    // Its stamp may be what is wrong with it: too early, by a slip of the clock.
+    for early in [START, START + PERIOD] {
+        let refused = simple(&with_hole(Some(plane(early, 2, TURN))));
+        assert_eq!(refused.reasons[REASON_STAMP_NOT_AFTER as usize], 1);
+        assert_eq!(refused.counters.lost, 0);
+        assert_eq!(refused.last().bits(), lost.last().bits());
+    }
     // A row that is repeated is not missed.
     let again = simple(&with_hole(Some(plane(START + PERIOD, 1, TURN))));
     assert_eq!(again.reasons[REASON_STAMP_NOT_AFTER as usize], 1);

@@ -189,7 +189,7 @@ pub fn files_deleted(plan: &Plan) -> Outcome {
         survivors: "daemon (feeder and reader have to be started again)",
         times,
         files: Some((0, after)),
-        note: "the daemon notices at its next health message, and keeps its state".to_owned(),
+        note: "the daemon notices within a quarter of a second, and keeps its state".to_owned(),
         ..Outcome::default()
     }
 }

@@ -1,6 +1,7 @@
 //! Faults, hostile bytes, and who may open what. Every row of the fault table in its short form: `cargo run --release -p inekf-tests -- faults --rounds 1000` is the
 //! long one.
 
+mod ages;
 mod fuzz;
 mod permissions;
 

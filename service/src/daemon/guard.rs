@@ -1,0 +1,64 @@
+//! Looks after the files of the daemon's ports, on a thread of its own: the estimation thread makes no system call.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use inekf_shared::transport::Watched;
+use tracing::warn;
+
+/// Time between two looks.
+const PERIOD: Duration = Duration::from_millis(250);
+
+/// Whether somebody has removed files of the ports while they are in use. Ends its thread when dropped.
+/// The default looks after nothing.
+#[derive(Debug, Default)]
+pub struct Guard {
+    gone: Arc<AtomicBool>,
+    /// Dropped first: it ends the thread.
+    awake: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Guard {
+    /// Looks after these files from now on. If there can be no thread, nobody does, and the log says so.
+    pub fn of(watched: Watched) -> Self {
+        let gone = Arc::new(AtomicBool::new(false));
+        let (awake, asleep) = channel::<()>();
+        let told = Arc::clone(&gone);
+        let look = move || {
+            while asleep.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
+                if !watched.is_intact() {
+                    told.store(true, Ordering::Relaxed);
+                    return;
+                }
+            }
+        };
+        let thread = thread::Builder::new().name("files".to_owned()).spawn(look);
+        if let Err(error) = &thread {
+            warn!("no thread to look after the files in shared memory: {error}");
+        }
+        Self {
+            gone,
+            awake: Some(awake),
+            thread: thread.ok(),
+        }
+    }
+
+    /// Whether a file has gone. One load.
+    pub fn has_lost(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        drop(self.awake.take());
+        if let Some(thread) = self.thread.take() {
+            // It has nothing to say.
+            let _ = thread.join();
+        }
+    }
+}

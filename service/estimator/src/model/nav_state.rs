@@ -144,6 +144,7 @@ impl InertialState<15> for NavState {
         }
     }
 
+    #[inline(always)]
     fn carry(transition: &Transition, p: &mut Matrix15, noise: &ImuNoise) {
         transition.carry(p, noise);
     }

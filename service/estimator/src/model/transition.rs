@@ -84,30 +84,43 @@ impl Transition {
         const { assert!(D == POSE || D == POSE + INPUTS) };
         let p = &mut p.data.0;
         let lines = Lines::new(self);
-        let added = if D > POSE {
-            self.white(noise)
-        } else {
-            self.noise_covariance(noise)
-        };
         // P F^T, two rows at a time: the lines applied to two columns of the symmetric P. Of the pose, what the upper
-        // triangle of the result needs.
+        // triangle of the result needs. In loops: unrolled, the code outgrows what the processor holds decoded. The
+        // last two of an odd number of rows come first: then every pair that is read was written as one.
         let mut t = [[0.0; D]; POSE];
-        lines.carry_rows::<D, 0>(p, 0, &mut t);
-        lines.carry_rows::<D, 0>(p, 2, &mut t);
-        lines.carry_rows::<D, 1>(p, 4, &mut t);
-        lines.carry_rows::<D, 2>(p, 6, &mut t);
-        lines.carry_rows::<D, 2>(p, 7, &mut t);
         if D > POSE {
-            lines.carry_rows::<D, 0>(p, POSE, &mut t);
-            lines.carry_rows::<D, 0>(p, POSE + 2, &mut t);
-            lines.carry_rows::<D, 0>(p, POSE + 4, &mut t);
+            for row in [13, 0, 2, 8, 10, 12] {
+                lines.carry_rows::<D, 0>(p, row, &mut t);
+            }
+            lines.carry_rows::<D, 1>(p, 4, &mut t);
+            lines.carry_rows::<D, 2>(p, 6, &mut t);
+        } else {
+            for row in [0, 2] {
+                lines.carry_rows::<D, 0>(p, row, &mut t);
+            }
+            lines.carry_rows::<D, 1>(p, 4, &mut t);
+            for row in [7, 6] {
+                lines.carry_rows::<D, 2>(p, row, &mut t);
+            }
         }
         // F (P F^T) + Q, two columns at a time, as far as the diagonal.
-        lines.carry_columns::<D, 1>(&t, &added, 0, p);
-        lines.carry_columns::<D, 2>(&t, &added, 2, p);
-        lines.carry_columns::<D, 2>(&t, &added, 4, p);
-        lines.carry_columns::<D, 3>(&t, &added, 6, p);
-        lines.carry_columns::<D, 3>(&t, &added, 7, p);
+        if D > POSE {
+            let white = self.white(noise);
+            lines.carry_columns_with_biases::<D, 1>(&t, &white[0], 0, p);
+            for (column, white) in [2, 4].into_iter().zip(&white[1..3]) {
+                lines.carry_columns_with_biases::<D, 2>(&t, white, column, p);
+            }
+            for (column, white) in [6, 7].into_iter().zip(&white[3..5]) {
+                lines.carry_columns_with_biases::<D, 3>(&t, white, column, p);
+            }
+        } else {
+            let q = self.noise_covariance(noise);
+            lines.carry_columns::<D, 1>(&t, &q, 0, p);
+            lines.carry_columns::<D, 2>(&t, &q, 2, p);
+            lines.carry_columns::<D, 2>(&t, &q, 4, p);
+            lines.carry_columns::<D, 3>(&t, &q, 6, p);
+            lines.carry_columns::<D, 3>(&t, &q, 7, p);
+        }
         if D > POSE {
             for column in 0..POSE {
                 for row in POSE..D {
@@ -134,29 +147,32 @@ impl Transition {
         (noise.gyro_psd * rate, noise.accel_psd * rate)
     }
 
-    /// The covariance of the noise of each input with what it adds to the pose: `diag(psd / dt)` times the transpose
-    /// of `[N_0 0; N_1 A_1; N_2 A_2]`, by columns of the latter.
+    /// The covariance of the noise of each input with what it adds to the pose, `diag(psd / dt)` times the transpose
+    /// of `[N_0 0; N_1 A_1; N_2 A_2]`: of the inputs in turn, in two coordinates of the pose from 0, 2, 4, 6 and 7 on.
     #[inline(always)]
-    fn white(&self, noise: &ImuNoise) -> [Column; POSE] {
+    fn white(&self, noise: &ImuNoise) -> [[Pair; INPUTS]; 5] {
         let (gyro, accel) = self.densities(noise);
-        let mut columns = [[0.0; POSE]; POSE];
-        for block in 0..3 {
-            let by_rate = self.by_rate[block].scaled(gyro).entries();
-            for n in 0..3 {
-                for i in 0..3 {
-                    columns[n][3 * block + i] = by_rate[n][i];
-                }
-            }
-            if block > 0 {
-                let by_force = self.by_force[block - 1].scaled(accel).entries();
-                for n in 0..3 {
-                    for i in 0..3 {
-                        columns[3 + n][3 * block + i] = by_force[n][i];
-                    }
-                }
-            }
+        let [n_0, n_1, n_2] = self.by_rate;
+        let [a_1, a_2] = self.by_force;
+        let [n_0, n_1, n_2] = [
+            n_0.scaled(gyro).entries(),
+            n_1.scaled(gyro).entries(),
+            n_2.scaled(gyro).entries(),
+        ];
+        let [a_1, a_2] = [a_1.scaled(accel).entries(), a_2.scaled(accel).entries()];
+        let mut white = [[Pair::splat(0.0); INPUTS]; 5];
+        for n in 0..3 {
+            white[0][n] = Pair::new(n_0[n][0], n_0[n][1]);
+            white[1][n] = Pair::new(n_0[n][2], n_1[n][0]);
+            white[2][n] = Pair::new(n_1[n][1], n_1[n][2]);
+            white[3][n] = Pair::new(n_2[n][0], n_2[n][1]);
+            white[4][n] = Pair::new(n_2[n][1], n_2[n][2]);
+            white[1][3 + n] = Pair::new(0.0, a_1[n][0]);
+            white[2][3 + n] = Pair::new(a_1[n][1], a_1[n][2]);
+            white[3][3 + n] = Pair::new(a_2[n][0], a_2[n][1]);
+            white[4][3 + n] = Pair::new(a_2[n][1], a_2[n][2]);
         }
-        columns
+        white
     }
 
     /// Q on the pose, the blocks of its lower triangle, by columns; zero above.
@@ -224,6 +240,35 @@ fn twice(block: Block) -> Twice {
     twice
 }
 
+/// Two columns of `(P F^T)^T`, from `column` on.
+#[inline(always)]
+fn two_columns<const D: usize>(t: &[[f64; D]; POSE], column: usize) -> [Pair; D] {
+    let (first, second) = (&t[column], &t[column + 1]);
+    let mut xi = [Pair::splat(0.0); D];
+    for half in 0..D / 2 {
+        let k = 2 * half;
+        let [even, odd] = Pair::load(first, k).transposed(Pair::load(second, k));
+        xi[k] = even;
+        xi[k + 1] = odd;
+    }
+    xi[D - 1] = Pair::new(first[D - 1], second[D - 1]);
+    xi
+}
+
+/// Puts two columns from `column` on, as far as the diagonal, into the symmetric P.
+#[inline(always)]
+fn put_columns<const D: usize>(columns: &[Pair; POSE], column: usize, p: &mut [[f64; D]; D]) {
+    for row in 0..column + 2 {
+        let [first, second] = columns[row].entries();
+        if row <= column {
+            p[row][column] = first;
+            p[column][row] = first;
+        }
+        p[row][column + 1] = second;
+        p[column + 1][row] = second;
+    }
+}
+
 impl Lines {
     #[inline(always)]
     fn new(transition: &Transition) -> Self {
@@ -232,10 +277,7 @@ impl Lines {
         let [a_1, a_2] = transition.by_force;
         Self {
             dt_s: Pair::splat(transition.dt_s),
-            turn: match transition.turn {
-                Some(e) => Some(twice(e)),
-                None => None,
-            },
+            turn: transition.turn.map(twice),
             couplings: [
                 [Pair::splat(c_1.x), Pair::splat(c_1.y), Pair::splat(c_1.z)],
                 [Pair::splat(c_2.x), Pair::splat(c_2.y), Pair::splat(c_2.z)],
@@ -260,9 +302,7 @@ impl Lines {
         let mut moved = self.moved_freely::<D, FROM, 3>(&xi);
         if D > POSE {
             let mut biases = [Pair::splat(0.0); INPUTS];
-            for n in 0..INPUTS {
-                biases[n] = xi[POSE + n];
-            }
+            biases.copy_from_slice(&xi[POSE..]);
             self.subtract::<FROM, 3>(&mut moved, &biases);
         }
         for k in 3 * FROM..POSE {
@@ -271,46 +311,39 @@ impl Lines {
     }
 
     /// Two columns of `F T + Q` as far as the diagonal, in the first BLOCKS blocks, and the same entries of two rows.
-    /// What is `added` is the covariance of the noise with the inputs where there are biases, and Q where there are
-    /// none.
     #[inline(always)]
     fn carry_columns<const D: usize, const BLOCKS: usize>(
         &self,
         t: &[[f64; D]; POSE],
-        added: &[Column; POSE],
+        q: &[Column; POSE],
         column: usize,
         p: &mut [[f64; D]; D],
     ) {
-        let (first, second) = (&t[column], &t[column + 1]);
-        let mut xi = [Pair::splat(0.0); D];
-        for half in 0..D / 2 {
-            let k = 2 * half;
-            let [even, odd] = Pair::load(first, k).transposed(Pair::load(second, k));
-            xi[k] = even;
-            xi[k + 1] = odd;
-        }
-        xi[D - 1] = Pair::new(first[D - 1], second[D - 1]);
+        let xi = two_columns(t, column);
         let mut moved = self.moved_freely::<D, 0, BLOCKS>(&xi);
-        if D > POSE {
-            let mut biases = [Pair::splat(0.0); INPUTS];
-            for n in 0..INPUTS {
-                biases[n] = xi[POSE + n] - Pair::load(&added[n], column);
-            }
-            self.subtract::<0, BLOCKS>(&mut moved, &biases);
-        } else {
-            for row in 0..column + 2 {
-                moved[row] = moved[row] + Pair::load(&added[row], column);
-            }
-        }
         for row in 0..column + 2 {
-            let [first, second] = moved[row].entries();
-            if row <= column {
-                p[row][column] = first;
-                p[column][row] = first;
-            }
-            p[row][column + 1] = second;
-            p[column + 1][row] = second;
+            moved[row] = moved[row] + Pair::load(&q[row], column);
         }
+        put_columns(&moved, column, p);
+    }
+
+    /// The same where there are biases, as which the noise comes in: `white` is its covariance with the two columns.
+    #[inline(always)]
+    fn carry_columns_with_biases<const D: usize, const BLOCKS: usize>(
+        &self,
+        t: &[[f64; D]; POSE],
+        white: &[Pair; INPUTS],
+        column: usize,
+        p: &mut [[f64; D]; D],
+    ) {
+        let xi = two_columns(t, column);
+        let mut biases = [Pair::splat(0.0); INPUTS];
+        for n in 0..INPUTS {
+            biases[n] = xi[POSE + n] - white[n];
+        }
+        let mut moved = self.moved_freely::<D, 0, BLOCKS>(&xi);
+        self.subtract::<0, BLOCKS>(&mut moved, &biases);
+        put_columns(&moved, column, p);
     }
 
     /// What the biases do to the pose, in the blocks FROM..END.
@@ -323,13 +356,11 @@ impl Lines {
         for block in FROM..END {
             for i in 0..3 {
                 let mut entry = pose[3 * block + i];
-                for n in 0..3 {
-                    entry = entry - self.by_rate[block][n][i] * biases[n];
-                }
+                let [x, y, z] = &self.by_rate[block];
+                entry = entry - x[i] * biases[0] - y[i] * biases[1] - z[i] * biases[2];
                 if block > 0 {
-                    for n in 0..3 {
-                        entry = entry - self.by_force[block - 1][n][i] * biases[3 + n];
-                    }
+                    let [x, y, z] = &self.by_force[block - 1];
+                    entry = entry - x[i] * biases[3] - y[i] * biases[4] - z[i] * biases[5];
                 }
                 pose[3 * block + i] = entry;
             }

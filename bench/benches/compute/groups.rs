@@ -2,61 +2,55 @@
 
 use core::hint::black_box;
 
-use criterion::Criterion;
 use inekf::filter::{Belief, Left};
 use inekf::lie::{LieGroup, SE2, SE3, SE23, SO2, SO3, TwoFrames};
 use inekf::model::NavState;
 use nalgebra::SVector;
 
 use crate::dense;
-use crate::setup::{assert_same, belief, in_place, state};
+use crate::setup::{assert_same, belief, state};
+use crate::suite::Suite;
 
 /// At a small turn, as in a sample, and at a large one, where the series end.
-fn maps<G: LieGroup<D>, const D: usize>(criterion: &mut Criterion, name: &str) {
-    let mut group = criterion.benchmark_group("lie");
+fn maps<G: LieGroup<D>, const D: usize>(suite: &mut impl Suite, name: &str) {
     for (size, scale) in [("small", 0.02), ("large", 0.6)] {
         let xi = SVector::<f64, D>::from_fn(|i, _| scale * (1.0 + 0.3 * i as f64));
         let element = G::exp(&xi);
-        group.bench_function(format!("{name}/exp_{size}"), |bencher| {
-            bencher.iter(|| G::exp(black_box(&xi)));
-        });
-        group.bench_function(format!("{name}/log_{size}"), |bencher| {
-            bencher.iter(|| black_box(&element).log());
+        suite.call(&format!("lie/{name}/exp_{size}"), || G::exp(black_box(&xi)));
+        suite.call(&format!("lie/{name}/log_{size}"), || {
+            black_box(&element).log()
         });
     }
-    group.finish();
 }
 
-fn sides<G: LieGroup<D>, const D: usize>(criterion: &mut Criterion, name: &str, mean: G) {
+fn sides<G: LieGroup<D>, const D: usize>(suite: &mut impl Suite, name: &str, mean: G) {
     let left: Belief<G, Left, D> = belief(mean);
     let right = left.to_right();
     let plainly = dense::transformed(&mean.adjoint(), left.covariance.matrix());
     assert_same(right.covariance.matrix(), &plainly);
 
-    let mut group = criterion.benchmark_group("coordinates");
-    in_place(&mut group, &format!("{name}/to_right"), left, |belief| {
+    suite.in_place(&format!("coordinates/{name}/to_right"), left, |belief| {
         let right = belief.to_right();
         belief.covariance = right.covariance;
     });
-    in_place(&mut group, &format!("{name}/to_left"), right, |belief| {
+    suite.in_place(&format!("coordinates/{name}/to_left"), right, |belief| {
         belief.covariance = belief.left_covariance();
     });
     let p = *left.covariance.matrix();
-    in_place(&mut group, &format!("{name}/dense"), p, |p| {
+    suite.in_place(&format!("coordinates/{name}/dense"), p, |p| {
         *p = dense::transformed(&black_box(mean).adjoint(), p);
     });
-    group.finish();
 }
 
-/// Registers the benchmarks.
-pub fn bench(criterion: &mut Criterion) {
-    maps::<SO2, 1>(criterion, "so2");
-    maps::<SO3, 3>(criterion, "so3");
-    maps::<SE2, 3>(criterion, "se2");
-    maps::<SE3, 6>(criterion, "se3");
-    maps::<SE23, 9>(criterion, "se23");
-    maps::<TwoFrames, 15>(criterion, "two_frames");
-    maps::<NavState, 15>(criterion, "nav_state");
-    sides::<SE23, 9>(criterion, "9", state().pose);
-    sides::<NavState, 15>(criterion, "15", state());
+/// Registers the routines.
+pub fn routines(suite: &mut impl Suite) {
+    maps::<SO2, 1>(suite, "so2");
+    maps::<SO3, 3>(suite, "so3");
+    maps::<SE2, 3>(suite, "se2");
+    maps::<SE3, 6>(suite, "se3");
+    maps::<SE23, 9>(suite, "se23");
+    maps::<TwoFrames, 15>(suite, "two_frames");
+    maps::<NavState, 15>(suite, "nav_state");
+    sides::<SE23, 9>(suite, "9", state().pose);
+    sides::<NavState, 15>(suite, "15", state());
 }

@@ -1,29 +1,51 @@
-//! What the mathematics of one sample and of one fix costs, in nanoseconds, beside plain dense algebra.
+//! What the mathematics of one sample and of one fix costs, in nanoseconds and in instructions, beside plain dense
+//! algebra.
 //!
-//! `cargo bench -p inekf-bench --bench compute [-- FILTER]`. Every figure is one call on data in the first
-//! cache, as the daemon makes it: in place, on a belief that the call before it did not touch. A name that
-//! ends in `/dense` is the same result by general matrix products, written in [`dense`]; the two are compared
-//! before anything is timed.
+//! `cargo bench -p inekf-bench --bench compute [-- FILTER]` times; with `-- --instructions [FILTER]` callgrind counts
+//! (needs valgrind). Every figure is one call on data in the first cache, as the daemon makes it: in place, on a belief
+//! that the call before it did not touch. A name that ends in `/dense` is the same result by general matrix products,
+//! written in [`dense`]; the two are compared before anything is measured.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use std::process::ExitCode;
 
+mod clock;
 mod dense;
 mod groups;
+mod instructions;
 mod predict;
 mod setup;
+mod smoother;
+mod suite;
 mod update;
 
-fn all(criterion: &mut Criterion) {
-    predict::bench(criterion);
-    update::bench(criterion);
-    groups::bench(criterion);
+use clock::Clock;
+use instructions::Request;
+use suite::{Names, Suite};
+
+fn routines(suite: &mut impl Suite) {
+    predict::routines(suite);
+    update::routines(suite);
+    groups::routines(suite);
+    smoother::routines(suite);
 }
 
-criterion_group! {
-    name = compute;
-    config = Criterion::default()
-        .warm_up_time(core::time::Duration::from_millis(300))
-        .measurement_time(core::time::Duration::from_millis(1000));
-    targets = all
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match Request::parse(&arguments) {
+        None => {
+            let mut clock = Clock::new();
+            routines(&mut clock);
+            clock.finish();
+        }
+        Some(Request::Run(mut calls)) => routines(&mut calls),
+        Some(Request::Count(filter)) => {
+            let mut names = Names::default();
+            routines(&mut names);
+            if let Err(error) = instructions::count(&names, &filter) {
+                eprintln!("{error}");
+                return ExitCode::FAILURE;
+            }
+        }
+    }
+    ExitCode::SUCCESS
 }
-criterion_main!(compute);

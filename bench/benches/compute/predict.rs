@@ -2,13 +2,13 @@
 
 use core::hint::black_box;
 
-use criterion::Criterion;
 use inekf::filter::{Belief, InertialSide, Left, Right, propagate_in_place};
 use inekf::lie::SE23;
 use inekf::model::{Discretisation, InertialState, NavState};
 
 use crate::dense;
-use crate::setup::{DT_S, GRAVITY_W, NOISE, assert_same, belief, in_place, sample, state};
+use crate::setup::{DT_S, GRAVITY_W, NOISE, assert_same, belief, sample, state};
+use crate::suite::Suite;
 
 fn step<G: InertialState<D>, S: InertialSide, const D: usize>(
     belief: &mut Belief<G, S, D>,
@@ -19,7 +19,7 @@ fn step<G: InertialState<D>, S: InertialSide, const D: usize>(
 }
 
 fn pair<G: InertialState<D>, S: InertialSide, const D: usize>(
-    criterion: &mut Criterion,
+    suite: &mut impl Suite,
     name: &str,
     start: Belief<G, S, D>,
 ) {
@@ -29,33 +29,26 @@ fn pair<G: InertialState<D>, S: InertialSide, const D: usize>(
     dense::propagate(&mut plain);
     assert_same(fast.covariance.matrix(), plain.covariance.matrix());
 
-    let mut group = criterion.benchmark_group("predict");
-    in_place(&mut group, name, start, |belief| step(belief, zoh));
     let euler = Discretisation::Euler;
-    in_place(&mut group, &format!("{name}/euler"), start, |belief| {
-        step(belief, euler)
+    suite.in_place(&format!("predict/{name}"), start, |belief| {
+        step(belief, zoh);
     });
-    in_place(
-        &mut group,
-        &format!("{name}/dense"),
-        start,
-        dense::propagate,
-    );
-    group.finish();
+    suite.in_place(&format!("predict/{name}/euler"), start, |belief| {
+        step(belief, euler);
+    });
+    suite.in_place(&format!("predict/{name}/dense"), start, dense::propagate);
 }
 
-/// Registers the benchmarks.
-pub fn bench(criterion: &mut Criterion) {
+/// Registers the routines.
+pub fn routines(suite: &mut impl Suite) {
     let zoh = Discretisation::ZeroOrderHold;
-    let mut group = criterion.benchmark_group("predict");
-    in_place(&mut group, "mean", state().pose, |pose| {
+    suite.in_place("predict/mean", state().pose, |pose| {
         *pose = pose
             .increment(&black_box(sample()), &GRAVITY_W, DT_S, zoh)
             .apply(pose);
     });
-    group.finish();
-    pair::<SE23, Left, 9>(criterion, "9_left", belief(state().pose));
-    pair::<SE23, Right, 9>(criterion, "9_right", belief(state().pose));
-    pair::<NavState, Left, 15>(criterion, "15_left", belief(state()));
-    pair::<NavState, Right, 15>(criterion, "15_right", belief(state()));
+    pair::<SE23, Left, 9>(suite, "9_left", belief(state().pose));
+    pair::<SE23, Right, 9>(suite, "9_right", belief(state().pose));
+    pair::<NavState, Left, 15>(suite, "15_left", belief(state()));
+    pair::<NavState, Right, 15>(suite, "15_right", belief(state()));
 }

@@ -1,7 +1,5 @@
 //! The vehicle that is timed: a belief with no zero in it, a lively IMU sample, a fix a metre off.
 
-use criterion::measurement::WallTime;
-use criterion::{BatchSize, BenchmarkGroup};
 use inekf::filter::{Belief, Covariance, Side};
 use inekf::lie::{LieGroup, SE23, SO3};
 use inekf::model::{ImuInput, ImuNoise, NavState, PositionObservation};
@@ -23,9 +21,6 @@ pub const NOISE: ImuNoise = ImuNoise {
     gyro_bias_psd: 1e-10,
     accel_bias_psd: 1e-8,
 };
-
-/// How many beliefs are prepared at a time: few enough for the first cache.
-const BATCH: u64 = 12;
 
 /// A car that turns and brakes: rad/s and m/s^2, body frame.
 pub fn sample() -> ImuInput {
@@ -64,18 +59,6 @@ pub fn belief<G: LieGroup<D>, S: Side, const D: usize>(mean: G) -> Belief<G, S, 
     let sigmas = SVector::<f64, D>::from_fn(|i, _| [0.1, 0.5, 2.0, 0.003, 0.05][(i / 3) % 5]);
     let root = SMatrix::from_diagonal(&sigmas) * (SMatrix::identity() + 0.1 * mixing);
     Belief::from_left_covariance(mean, Covariance::from_upper(root * root.transpose()))
-}
-
-/// Times `change` on fresh copies of `start`; making the copies is not timed.
-pub fn in_place<T: Copy>(
-    group: &mut BenchmarkGroup<'_, WallTime>,
-    name: &str,
-    start: T,
-    mut change: impl FnMut(&mut T),
-) {
-    group.bench_function(name, |bencher| {
-        bencher.iter_batched_ref(|| start, &mut change, BatchSize::NumIterations(BATCH));
-    });
 }
 
 /// Fails unless each entry of two covariances agrees to `1e-9` of its standard deviations.

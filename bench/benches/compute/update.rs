@@ -3,7 +3,6 @@
 
 use core::hint::black_box;
 
-use criterion::Criterion;
 use inekf::filter::{
     Belief, Constrained, Gate, Left, Right, Side, Transport, UpdateOptions, update, update_with,
 };
@@ -15,7 +14,8 @@ use inekf::model::{
 use nalgebra::{Matrix2, SMatrix, Vector2, Vector3};
 
 use crate::dense;
-use crate::setup::{assert_same, belief, fix, in_place, state};
+use crate::setup::{assert_same, belief, fix, state};
+use crate::suite::Suite;
 
 /// Exactly three iterations: no step is small enough to stop early.
 const THREE: UpdateOptions = UpdateOptions {
@@ -35,7 +35,7 @@ fn correct<G: InertialState<D>, S: Side, const D: usize>(
 }
 
 fn position<G: InertialState<D>, S: Side, const D: usize>(
-    criterion: &mut Criterion,
+    suite: &mut impl Suite,
     name: &str,
     start: Belief<G, S, D>,
 ) {
@@ -43,14 +43,13 @@ fn position<G: InertialState<D>, S: Side, const D: usize>(
     let centred = fix(Vector3::zeros());
     let plain = UpdateOptions::PLAIN;
 
-    let mut group = criterion.benchmark_group("update");
-    in_place(&mut group, &format!("{name}/1"), start, |belief| {
+    suite.in_place(&format!("update/{name}/1"), start, |belief| {
         correct(belief, &antenna, &plain);
     });
-    in_place(&mut group, &format!("{name}/1_no_lever"), start, |belief| {
+    suite.in_place(&format!("update/{name}/1_no_lever"), start, |belief| {
         correct(belief, &centred, &plain);
     });
-    in_place(&mut group, &format!("{name}/3"), start, |belief| {
+    suite.in_place(&format!("update/{name}/3"), start, |belief| {
         correct(belief, &antenna, &THREE);
     });
     if S::IS_LEFT {
@@ -58,16 +57,15 @@ fn position<G: InertialState<D>, S: Side, const D: usize>(
         correct(&mut fast, &antenna, &plain);
         dense::update(&mut plainly, &antenna);
         assert_same(fast.covariance.matrix(), plainly.covariance.matrix());
-        in_place(&mut group, &format!("{name}/1/dense"), start, |belief| {
+        suite.in_place(&format!("update/{name}/1/dense"), start, |belief| {
             dense::update(belief, black_box(&antenna));
         });
     }
     assert_eq!(correct(&mut { start }, &antenna, &THREE), 3);
-    group.finish();
 }
 
 /// Two sources of position in the plane, and odometry: \[LC\] section VII.
-fn planar(criterion: &mut Criterion) {
+fn planar(suite: &mut impl Suite) {
     let start: Belief<SE2, Left, 3> = belief(SE2 {
         rotation: SO2::from_angle(0.7),
         position: Vector2::new(12.0, -5.0),
@@ -94,25 +92,23 @@ fn planar(criterion: &mut Criterion) {
     let mut way = ProcessColumns::<3>::new(&declared).expect("room for one");
     way.advance(&step, &SMatrix::identity());
 
-    let mut group = criterion.benchmark_group("update");
-    in_place(&mut group, "se2_pair/kalman", start, |belief| {
+    suite.in_place("update/se2_pair/kalman", start, |belief| {
         update(belief, black_box(&pair), &UpdateOptions::PLAIN).expect("sound fixes");
     });
-    in_place(&mut group, "se2_pair/lc", start, |belief| {
+    suite.in_place("update/se2_pair/lc", start, |belief| {
         let rule = Constrained::new(belief, &way, &outputs, &pair);
         update_with(belief, black_box(&pair), &rule, &UpdateOptions::PLAIN).expect("solvable");
     });
-    in_place(&mut group, "se2_pair/dense", start, |belief| {
+    suite.in_place("update/se2_pair/dense", start, |belief| {
         dense::update(belief, black_box(&pair));
     });
-    group.finish();
 }
 
-/// Registers the benchmarks.
-pub fn bench(criterion: &mut Criterion) {
-    position::<SE23, Left, 9>(criterion, "position_9_left", belief(state().pose));
-    position::<SE23, Right, 9>(criterion, "position_9_right", belief(state().pose));
-    position::<NavState, Left, 15>(criterion, "position_15_left", belief(state()));
-    position::<NavState, Right, 15>(criterion, "position_15_right", belief(state()));
-    planar(criterion);
+/// Registers the routines.
+pub fn routines(suite: &mut impl Suite) {
+    position::<SE23, Left, 9>(suite, "position_9_left", belief(state().pose));
+    position::<SE23, Right, 9>(suite, "position_9_right", belief(state().pose));
+    position::<NavState, Left, 15>(suite, "position_15_left", belief(state()));
+    position::<NavState, Right, 15>(suite, "position_15_right", belief(state()));
+    planar(suite);
 }

@@ -29,6 +29,7 @@
 
 mod columns;
 pub mod filter;
+mod lanes;
 pub mod lie;
 pub mod model;
 pub mod smoother;

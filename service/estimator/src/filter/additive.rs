@@ -49,6 +49,7 @@ impl Side for Additive {
 }
 
 impl InertialSide for Additive {
+    #[inline(always)]
     fn transition(increment: &ImuIncrement, before: &SE23, _after: &SE23) -> Transition {
         increment.additive_transition(before)
     }

@@ -127,9 +127,9 @@ impl<G: Pose<D, N>, const D: usize, const K: usize, const N: usize, const M: usi
         &self,
         prior: &Covariance<D>,
         linearised: &Linearised<G, D, M>,
-        gain: &SMatrix<f64, D, M>,
     ) -> Result<Covariance<D>, UpdateError> {
         let constraints = self.constraints(linearised)?;
-        Ok(constraints.covariance(prior, linearised, gain))
+        let gain = constraints.gain(linearised)?;
+        Ok(constraints.covariance(prior, linearised, &gain))
     }
 }

@@ -287,11 +287,10 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
         linearised: &Linearised<G, D, M>,
         gain: &SMatrix<f64, D, M>,
     ) -> Covariance<D> {
-        let corrected =
-            prior.corrected_with(&linearised.p_ht, gain, &linearised.h, &linearised.noise);
-        self.soft().fold(corrected, |covariance, column| {
-            let left = (column.t - gain * column.delta) * column.sigma;
-            covariance.plus(&(left * left.transpose()))
-        })
+        self.soft()
+            .fold(linearised.josephs(prior, gain), |covariance, column| {
+                let left = (column.t - gain * column.delta) * column.sigma;
+                covariance.plus(&(left * left.transpose()))
+            })
     }
 }

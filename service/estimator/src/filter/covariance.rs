@@ -6,8 +6,9 @@
 
 use nalgebra::{ArrayStorage, SMatrix, SVector};
 
-use super::linearised::sees;
+use super::seen::Seen;
 use crate::columns::{Column, combined};
+use crate::lanes::Pair;
 use crate::lie::LieGroup;
 
 /// A symmetric D x D matrix, meant positive semidefinite.
@@ -50,14 +51,32 @@ fn without<const ROWS: usize, const D: usize, const M: usize>(
 }
 
 /// `A H^T`. A sensor sees few of the states: the others are passed over.
+#[inline(always)]
 fn times_transposed<const D: usize, const M: usize>(
     a: &SMatrix<f64, D, D>,
+    seen: &Seen<D>,
     h: &SMatrix<f64, M, D>,
 ) -> SMatrix<f64, D, M> {
+    let (a, h) = (&a.data.0, &h.data.0);
     let mut product = [[0.0; D]; M];
-    for k in (0..D).filter(|k| sees(h, *k)) {
-        for (row, column) in product.iter_mut().enumerate() {
-            add(column, h[(row, k)], &a.data.0[k]);
+    for half in 0..D / 2 {
+        let row = 2 * half;
+        let mut sums = [Pair::splat(0.0); M];
+        for &k in seen.states() {
+            let entries = Pair::load(&a[k], row);
+            for m in 0..M {
+                sums[m] = sums[m] + entries * Pair::splat(h[k][m]);
+            }
+        }
+        for m in 0..M {
+            sums[m].store(&mut product[m], row);
+        }
+    }
+    if D % 2 == 1 {
+        for &k in seen.states() {
+            for m in 0..M {
+                product[m][D - 1] += a[k][D - 1] * h[k][m];
+            }
         }
     }
     SMatrix::from_array_storage(ArrayStorage(product))
@@ -127,7 +146,45 @@ impl<const D: usize> Covariance<D> {
 
     /// `P H^T`, D x M.
     pub fn times_transposed<const M: usize>(&self, h: &SMatrix<f64, M, D>) -> SMatrix<f64, D, M> {
-        times_transposed(&self.0, h)
+        self.times_transposed_of(&Seen::by(h), h)
+    }
+
+    /// [`times_transposed`](Self::times_transposed), where it is known which states H sees.
+    #[inline(always)]
+    pub(super) fn times_transposed_of<const M: usize>(
+        &self,
+        seen: &Seen<D>,
+        h: &SMatrix<f64, M, D>,
+    ) -> SMatrix<f64, D, M> {
+        times_transposed(&self.0, seen, h)
+    }
+
+    /// `P - W R W^T` for a diagonal R.
+    #[inline(always)]
+    pub(super) fn reduced<const M: usize>(
+        &self,
+        w: &SMatrix<f64, D, M>,
+        r: &SVector<f64, M>,
+    ) -> Self {
+        let w = &w.data.0;
+        let mut reduced = *self;
+        for (index, column) in reduced.0.data.0.iter_mut().enumerate() {
+            let mut factors = [0.0; M];
+            for m in 0..M {
+                factors[m] = -(w[m][index] * r[m]);
+            }
+            // As many rows as reach the diagonal, in lengths that are known.
+            *column = if index < 4 && D > 4 {
+                combined::<4, _, _, _, _>(column, factors, w.each_ref())
+            } else if index < 8 && D > 8 {
+                combined::<8, _, _, _, _>(column, factors, w.each_ref())
+            } else {
+                combined::<D, _, _, _, _>(column, factors, w.each_ref())
+            };
+        }
+        mirror(&mut reduced.0);
+        put_back_negative_variances(&mut reduced.0);
+        reduced
     }
 
     /// The covariance after a measurement with gain K (D x M), Jacobian H (M x D) and noise N (M x M):
@@ -141,7 +198,8 @@ impl<const D: usize> Covariance<D> {
         h: &SMatrix<f64, M, D>,
         noise: &SMatrix<f64, M, M>,
     ) -> Self {
-        self.corrected_with(&self.times_transposed(h), gain, h, noise)
+        let seen = Seen::by(h);
+        self.corrected_with(&self.times_transposed_of(&seen, h), gain, &seen, h, noise)
     }
 
     /// [`corrected`](Self::corrected) where `P H^T` is known.
@@ -149,6 +207,7 @@ impl<const D: usize> Covariance<D> {
         &self,
         p_ht: &SMatrix<f64, D, M>,
         gain: &SMatrix<f64, D, M>,
+        seen: &Seen<D>,
         h: &SMatrix<f64, M, D>,
         noise: &SMatrix<f64, M, M>,
     ) -> Self {
@@ -156,7 +215,7 @@ impl<const D: usize> Covariance<D> {
         let mut corrected = *self;
         // A H^T - K N, of which A is needed in the columns of the states that are seen.
         let mut excess = [[0.0; D]; M];
-        for state in (0..D).filter(|state| sees(h, *state)) {
+        for &state in seen.states() {
             let a = without::<D, D, M>(&self.0.data.0[state], p_ht, state, gains);
             for (row, column) in excess.iter_mut().enumerate() {
                 add(column, h[(row, state)], &a);

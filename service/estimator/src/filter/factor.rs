@@ -1,15 +1,17 @@
-//! Cholesky factors of the small matrices of an update: `S = L L^T`, M x M, unrolled.
+//! Factors of the small matrices of an update: `S = L D L^T`, M x M, unrolled.
 //!
-//! With the reciprocals of the diagonal kept, so that solving divides by nothing; half the time of the
-//! general factorisation at M = 3.
+//! L has ones on its diagonal, so that no root is taken, and the reciprocals of D are kept, so that solving divides
+//! by nothing.
 
 use nalgebra::{SMatrix, SVector};
 
-/// L, lower triangular with a positive diagonal.
+/// L, lower triangular with a diagonal of ones, and a positive diagonal D.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factor<const M: usize> {
+    /// Below its diagonal; zero elsewhere.
     l: SMatrix<f64, M, M>,
-    /// `1 / l_ii`.
+    pivots: SVector<f64, M>,
+    /// `1 / d_i`.
     reciprocals: SVector<f64, M>,
 }
 
@@ -19,44 +21,76 @@ impl<const M: usize> Factor<M> {
     #[inline]
     pub fn new(s: &SMatrix<f64, M, M>) -> Option<Self> {
         let mut l = SMatrix::<f64, M, M>::zeros();
+        let mut pivots = SVector::<f64, M>::zeros();
         let mut reciprocals = SVector::<f64, M>::zeros();
         for j in 0..M {
+            // Row j of L D.
+            let mut scaled = [0.0; M];
             let mut pivot = s[(j, j)];
             for k in 0..j {
-                pivot -= l[(j, k)] * l[(j, k)];
+                scaled[k] = l[(j, k)] * pivots[k];
+                pivot -= l[(j, k)] * scaled[k];
             }
             // A NaN is not above zero either.
             if !(pivot > 0.0 && pivot.is_finite()) {
                 return None;
             }
-            let root = pivot.sqrt();
-            l[(j, j)] = root;
-            reciprocals[j] = 1.0 / root;
+            pivots[j] = pivot;
+            reciprocals[j] = 1.0 / pivot;
             for i in j + 1..M {
                 let mut entry = s[(i, j)];
                 for k in 0..j {
-                    entry -= l[(i, k)] * l[(j, k)];
+                    entry -= l[(i, k)] * scaled[k];
                 }
                 l[(i, j)] = entry * reciprocals[j];
             }
         }
-        Some(Self { l, reciprocals })
+        Some(Self {
+            l,
+            pivots,
+            reciprocals,
+        })
     }
 
-    /// L.
+    /// The Cholesky factor, `L D^1/2`.
     pub fn l(&self) -> SMatrix<f64, M, M> {
-        self.l
+        let mut root = self.l;
+        root.fill_diagonal(1.0);
+        for (column, pivot) in self.pivots.iter().enumerate() {
+            root.column_mut(column).scale_mut(pivot.sqrt());
+        }
+        root
     }
 
-    /// `L^-1 z`, whose square is `z^T S^-1 z`.
+    /// `1 / d_i`.
     #[inline]
-    pub fn whitened(&self, z: &SVector<f64, M>) -> SVector<f64, M> {
+    pub fn reciprocals(&self) -> &SVector<f64, M> {
+        &self.reciprocals
+    }
+
+    /// `L^-1 z`: `z^T S^-1 z` is the sum of its squares, each divided by its `d_i`.
+    #[inline]
+    pub fn decorrelated(&self, z: &SVector<f64, M>) -> SVector<f64, M> {
         let mut w = *z;
         for i in 0..M {
             for k in 0..i {
                 w[i] -= self.l[(i, k)] * w[k];
             }
-            w[i] *= self.reciprocals[i];
+        }
+        w
+    }
+
+    /// `B L^-T`: the rows of B, [`decorrelated`](Self::decorrelated).
+    #[inline(always)]
+    pub fn decorrelated_rows<const D: usize>(&self, b: &SMatrix<f64, D, M>) -> SMatrix<f64, D, M> {
+        let mut w = *b;
+        for i in 0..M {
+            for k in 0..i {
+                let factor = self.l[(i, k)];
+                for row in 0..D {
+                    w[(row, i)] -= factor * w[(row, k)];
+                }
+            }
         }
         w
     }
@@ -64,12 +98,14 @@ impl<const M: usize> Factor<M> {
     /// `S^-1 z`.
     #[inline]
     pub fn solve(&self, z: &SVector<f64, M>) -> SVector<f64, M> {
-        let mut x = self.whitened(z);
+        let mut x = self.decorrelated(z);
+        for i in 0..M {
+            x[i] *= self.reciprocals[i];
+        }
         for i in (0..M).rev() {
             for k in i + 1..M {
                 x[i] -= self.l[(k, i)] * x[k];
             }
-            x[i] *= self.reciprocals[i];
         }
         x
     }
@@ -92,18 +128,22 @@ impl<const M: usize> Factor<M> {
     /// `z^T S^-1 z`.
     #[inline]
     pub fn normalised_square(&self, z: &SVector<f64, M>) -> f64 {
-        self.whitened(z).norm_squared()
+        let w = self.decorrelated(z);
+        let mut sum = 0.0;
+        for i in 0..M {
+            sum += w[i] * w[i] * self.reciprocals[i];
+        }
+        sum
     }
 
     /// `ln det S`.
     pub fn log_determinant(&self) -> f64 {
-        let product: f64 = (0..M).map(|i| self.l[(i, i)]).product();
+        let product: f64 = self.pivots.iter().product();
         // One logarithm for all, unless the product leaves the numbers.
-        let log_root = if product.is_normal() {
+        if product.is_normal() {
             product.ln()
         } else {
-            (0..M).map(|i| self.l[(i, i)].ln()).sum()
-        };
-        2.0 * log_root
+            self.pivots.iter().map(|pivot| pivot.ln()).sum()
+        }
     }
 }

@@ -76,7 +76,7 @@ pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
         })
     }
 
-    /// The covariance after a correction with `gain`: Joseph's form, unless the rule says more.
+    /// The covariance after a correction with the [`gain`](Self::gain): Joseph's form, unless the rule says more.
     ///
     /// # Errors
     /// [`UpdateError`].
@@ -84,9 +84,8 @@ pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
         &self,
         prior: &Covariance<D>,
         linearised: &Linearised<G, D, M>,
-        gain: &SMatrix<f64, D, M>,
     ) -> Result<Covariance<D>, UpdateError> {
-        Ok(prior.corrected_with(&linearised.p_ht, gain, &linearised.h, &linearised.noise))
+        Ok(linearised.josephs(prior, &self.gain(prior, linearised)?))
     }
 }
 
@@ -122,16 +121,31 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> GainRule<G, D, M> for Kalma
         Ok(kalman_gain(linearised))
     }
 
+    #[inline(always)]
     fn step(
         &self,
         _prior: &Covariance<D>,
         linearised: &Linearised<G, D, M>,
         target: &SVector<f64, M>,
     ) -> Result<Iterate<D>, UpdateError> {
-        let lambda = linearised.innovation.solve(target);
-        Ok(Iterate {
-            xi: linearised.p_ht * lambda,
-            eta: linearised.h.transpose() * lambda,
+        Ok(linearised.optimum(target))
+    }
+
+    /// Joseph's form where the measurement is much more precise than the prior, `P - W D^-1 W^T` with
+    /// `W = P H^T L^-T`, `S = L D L^T`, where it is not: there no digits are lost.
+    #[inline(always)]
+    fn covariance(
+        &self,
+        prior: &Covariance<D>,
+        linearised: &Linearised<G, D, M>,
+    ) -> Result<Covariance<D>, UpdateError> {
+        Ok(if linearised.is_mild() {
+            prior.reduced(
+                &linearised.decorrelated(),
+                linearised.innovation.reciprocals(),
+            )
+        } else {
+            linearised.josephs(prior, &kalman_gain(linearised))
         })
     }
 }

@@ -80,7 +80,6 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> GainRule<G, D, M> for HInfi
         &self,
         prior: &Covariance<D>,
         linearised: &Linearised<G, D, M>,
-        _gain: &SMatrix<f64, D, M>,
     ) -> Result<Covariance<D>, UpdateError> {
         let corrected = prior.corrected(&kalman_gain(linearised), &linearised.h, &linearised.noise);
         let margin = self.margin(&corrected)?;

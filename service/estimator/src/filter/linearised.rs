@@ -3,7 +3,10 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::belief::Belief;
+use super::covariance::Covariance;
 use super::factor::Factor;
+use super::gain::Iterate;
+use super::seen::Seen;
 use super::side::Side;
 use crate::lie::LieGroup;
 use crate::model::Observation;
@@ -21,45 +24,23 @@ pub struct Linearised<G, const D: usize, const M: usize> {
     pub noise: SMatrix<f64, M, M>,
     /// `P H_i^T`.
     pub p_ht: SMatrix<f64, D, M>,
-    /// Cholesky factor of `S_i = H_i P H_i^T + N`.
+    /// Factor of `S_i = H_i P H_i^T + N`.
     pub innovation: Factor<M>,
-}
-
-/// Whether a column of H has an entry that is not zero: whether the sensor sees this state.
-#[inline(always)]
-pub(super) fn sees<const D: usize, const M: usize>(h: &SMatrix<f64, M, D>, state: usize) -> bool {
-    (0..M).any(|row| h[(row, state)] != 0.0)
-}
-
-/// `H J`, passing over the states that the sensor does not see.
-#[inline]
-fn times<const D: usize, const M: usize>(
-    h: &SMatrix<f64, M, D>,
-    j: &SMatrix<f64, D, D>,
-) -> SMatrix<f64, M, D> {
-    let mut product = SMatrix::<f64, M, D>::zeros();
-    for k in (0..D).filter(|k| sees(h, *k)) {
-        for column in 0..D {
-            let factor = j[(k, column)];
-            if factor != 0.0 {
-                for row in 0..M {
-                    product[(row, column)] += h[(row, k)] * factor;
-                }
-            }
-        }
-    }
-    product
+    seen: Seen<D>,
+    /// S.
+    covariance: SMatrix<f64, M, M>,
 }
 
 /// `N + H B`, passing over the states that the sensor does not see.
-#[inline]
+#[inline(always)]
 fn sum_of_product<const D: usize, const M: usize>(
     noise: &SMatrix<f64, M, M>,
     h: &SMatrix<f64, M, D>,
+    seen: &Seen<D>,
     b: &SMatrix<f64, D, M>,
 ) -> SMatrix<f64, M, M> {
     let mut sum = *noise;
-    for k in (0..D).filter(|k| sees(h, *k)) {
+    for &k in seen.states() {
         for column in 0..M {
             for row in 0..M {
                 sum[(row, column)] += h[(row, k)] * b[(k, column)];
@@ -72,6 +53,7 @@ fn sum_of_product<const D: usize, const M: usize>(
 impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     /// `observation` around `chi`, which lies `xi` away from the mean of `belief`. `None` if the innovation
     /// covariance is not positive definite.
+    #[inline(always)]
     pub fn at<S, O>(
         belief: &Belief<G, S, D>,
         observation: &O,
@@ -85,13 +67,15 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     {
         let mut h = observation.left_jacobian(chi);
         if !S::IS_LEFT {
-            h = times(&h, &S::to_left(chi));
+            h = G::row_product(&h, &S::to_left(chi));
         }
         if xi.iter().any(|component| *component != 0.0) {
-            h = times(&h, &S::jacobian::<G, D>(xi));
+            h = G::row_product(&h, &S::jacobian::<G, D>(xi));
         }
-        let p_ht = belief.covariance.times_transposed(&h);
-        let innovation = Factor::new(&sum_of_product(noise, &h, &p_ht))?;
+        let seen = Seen::by(&h);
+        let p_ht = belief.covariance.times_transposed_of(&seen, &h);
+        let covariance = sum_of_product(noise, &h, &seen, &p_ht);
+        let innovation = Factor::new(&covariance)?;
         Some(Self {
             chi: *chi,
             residual: observation.residual(chi),
@@ -99,12 +83,78 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
             noise: *noise,
             p_ht,
             innovation,
+            seen,
+            covariance,
         })
     }
 
     /// S, M x M.
     pub fn innovation_covariance(&self) -> SMatrix<f64, M, M> {
-        sum_of_product(&self.noise, &self.h, &self.p_ht)
+        self.covariance
+    }
+
+    /// `z_i + H_i xi`.
+    #[inline]
+    pub(super) fn target(&self, xi: &SVector<f64, D>) -> SVector<f64, M> {
+        let mut target = self.residual;
+        for &k in self.seen.states() {
+            for row in 0..M {
+                target[row] += self.h[(row, k)] * xi[k];
+            }
+        }
+        target
+    }
+
+    /// The Gauss-Newton iterate: `lambda = S^-1 target`, `xi = P H^T lambda`, `eta = H^T lambda`.
+    #[inline(always)]
+    pub(super) fn optimum(&self, target: &SVector<f64, M>) -> Iterate<D> {
+        let lambda = self.innovation.solve(target);
+        let (mut xi, mut eta) = (SVector::<f64, D>::zeros(), SVector::<f64, D>::zeros());
+        for row in 0..D {
+            for m in 0..M {
+                xi[row] += self.p_ht[(row, m)] * lambda[m];
+            }
+        }
+        for &k in self.seen.states() {
+            for m in 0..M {
+                eta[k] += self.h[(m, k)] * lambda[m];
+            }
+        }
+        Iterate { xi, eta }
+    }
+
+    /// Whether `P - K S K^T` loses no more than three of the digits of P: the update leaves of no variance less than
+    /// the thousandth part, for `tr(N^-1 S)` is above the largest ratio of S and N along any direction.
+    #[inline(always)]
+    pub(super) fn is_mild(&self) -> bool {
+        const LARGEST_RATIO: f64 = 1e3;
+        let Some(noise) = Factor::new(&self.noise) else {
+            return false;
+        };
+        let mut trace = 0.0;
+        for m in 0..M {
+            let mut column = SVector::<f64, M>::zeros();
+            for row in 0..M {
+                column[row] = self.covariance[(row, m)];
+            }
+            trace += noise.solve(&column)[m];
+        }
+        trace < LARGEST_RATIO
+    }
+
+    /// `P H^T L^-T`, with `S = L D L^T`.
+    #[inline(always)]
+    pub(super) fn decorrelated(&self) -> SMatrix<f64, D, M> {
+        self.innovation.decorrelated_rows(&self.p_ht)
+    }
+
+    /// The covariance after a correction with `gain`, in Joseph's form.
+    pub(super) fn josephs(
+        &self,
+        prior: &Covariance<D>,
+        gain: &SMatrix<f64, D, M>,
+    ) -> Covariance<D> {
+        prior.corrected_with(&self.p_ht, gain, &self.seen, &self.h, &self.noise)
     }
 
     /// `z^T S^-1 z`.

@@ -41,6 +41,7 @@ pub mod gate;
 pub mod hinf;
 pub mod linearised;
 pub mod propagate;
+mod seen;
 pub mod side;
 pub mod update;
 

@@ -128,12 +128,14 @@ impl Side for Right {
 }
 
 impl InertialSide for Left {
+    #[inline(always)]
     fn transition(increment: &ImuIncrement, _before: &SE23, _after: &SE23) -> Transition {
         increment.left_transition()
     }
 }
 
 impl InertialSide for Right {
+    #[inline(always)]
     fn transition(increment: &ImuIncrement, before: &SE23, after: &SE23) -> Transition {
         increment.right_transition(before, after)
     }

@@ -221,7 +221,11 @@ where
     let noise = observation.noise();
     let noise_factor = Factor::new(&noise).ok_or(UpdateError::InnovationNotPositiveDefinite)?;
     let cost = |iterate: &Iterate<D>, chi: &G| {
-        iterate.xi.dot(&iterate.eta) + noise_factor.normalised_square(&observation.residual(chi))
+        let mut square = noise_factor.normalised_square(&observation.residual(chi));
+        for k in 0..D {
+            square += iterate.xi[k] * iterate.eta[k];
+        }
+        square
     };
 
     let mut current = Iterate {
@@ -229,66 +233,74 @@ where
         eta: SVector::zeros(),
     };
     let mut chi = belief.mean;
-    let mut linearised = Linearised::at(belief, observation, &chi, &current.xi, &noise)
-        .ok_or(UpdateError::InnovationNotPositiveDefinite)?;
-    let Judgement { nis, degrees } = rule.judge(&linearised)?;
-    if !nis.is_finite() {
-        return Err(UpdateError::NotFinite);
-    }
-    let log_determinant = linearised.log_determinant();
-    if !options.gate.admits(nis, degrees) {
-        return Ok(Correction {
-            verdict: Verdict::Gated,
-            nis,
-            degrees,
-            log_determinant,
-            xi: SVector::zeros(),
-            iterations: 0,
-        });
-    }
-
-    let mut current_cost = noise_factor.normalised_square(&linearised.residual);
+    let mut judgement = Judgement {
+        nis: 0.0,
+        degrees: M,
+    };
+    let (mut log_determinant, mut current_cost) = (0.0, 0.0);
     let mut iterations = 0;
-    loop {
-        let target = linearised.residual + linearised.h * current.xi;
+    let mut covariance = loop {
+        let linearised = Linearised::at(belief, observation, &chi, &current.xi, &noise)
+            .ok_or(UpdateError::InnovationNotPositiveDefinite)?;
+        if iterations == 0 {
+            judgement = rule.judge(&linearised)?;
+            let Judgement { nis, degrees } = judgement;
+            if !nis.is_finite() {
+                return Err(UpdateError::NotFinite);
+            }
+            log_determinant = linearised.log_determinant();
+            if !options.gate.admits(nis, degrees) {
+                return Ok(Correction {
+                    verdict: Verdict::Gated,
+                    nis,
+                    degrees,
+                    log_determinant,
+                    xi: SVector::zeros(),
+                    iterations: 0,
+                });
+            }
+            current_cost = noise_factor.normalised_square(&linearised.residual);
+        }
+        let target = linearised.target(&current.xi);
         let full = rule.step(&belief.covariance, &linearised, &target)?;
         iterations += 1;
-        let at = |fraction: f64| {
-            let iterate = current.towards(&full, fraction);
-            (iterate, S::retract(&belief.mean, &iterate.xi))
-        };
-        let (next, next_chi) = if options.iterations == 1 || !L::MINIMISES_COST {
-            at(1.0)
+        let moved = if options.iterations == 1 || !L::MINIMISES_COST {
+            Some((full, S::retract(&belief.mean, &full.xi)))
         } else {
             let before = current_cost * (1.0 + COST_ROUNDING) + FLAT_COST;
-            let shares = core::iter::successors(Some(1.0), |share| Some(0.5 * share));
-            let lower = shares
-                .take(MAX_TRIALS)
-                .map(at)
-                .map(|(iterate, chi)| (cost(&iterate, &chi), iterate, chi))
-                .find(|(cost, _, _)| *cost <= before);
-            match lower {
-                Some((lower, iterate, chi)) => {
+            let mut share = 1.0;
+            let mut trials = 0;
+            loop {
+                let iterate = current.towards(&full, share);
+                let chi = S::retract(&belief.mean, &iterate.xi);
+                let lower = cost(&iterate, &chi);
+                if lower <= before {
                     current_cost = lower;
-                    (iterate, chi)
+                    break Some((iterate, chi));
                 }
-                // At the minimum, as far as rounding lets it be told.
-                None if at(1.0).1.is_finite() => break,
-                None => return Err(UpdateError::NotFinite),
+                trials += 1;
+                if trials == MAX_TRIALS {
+                    break None;
+                }
+                share *= 0.5;
             }
         };
-        let step = next.xi - current.xi;
-        current = next;
-        chi = next_chi;
-        if iterations >= options.iterations || is_small(&step, belief, options.tolerance) {
-            break;
+        let ended = match moved {
+            Some((next, next_chi)) => {
+                let step = next.xi - current.xi;
+                current = next;
+                chi = next_chi;
+                iterations >= options.iterations || is_small(&step, belief, options.tolerance)
+            }
+            // At the minimum, as far as rounding lets it be told.
+            None if S::retract(&belief.mean, &full.xi).is_finite() => true,
+            None => return Err(UpdateError::NotFinite),
+        };
+        if ended {
+            break rule.covariance(&belief.covariance, &linearised)?;
         }
-        linearised = Linearised::at(belief, observation, &chi, &current.xi, &noise)
-            .ok_or(UpdateError::InnovationNotPositiveDefinite)?;
-    }
-
-    let gain = rule.gain(&belief.covariance, &linearised)?;
-    let mut covariance = rule.covariance(&belief.covariance, &linearised, &gain)?;
+    };
+    let Judgement { nis, degrees } = judgement;
     if options.transport == Transport::Jacobian {
         covariance.transform_by::<G>(&S::jacobian::<G, D>(&current.xi));
     }

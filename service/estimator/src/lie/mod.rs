@@ -97,6 +97,14 @@ pub trait LieGroup<const D: usize>: Copy + Clone + Debug + PartialEq {
         p.fill_lower_triangle_with_upper_triangle();
     }
 
+    /// `H A`, where A has the zeros of [`congruence`](Self::congruence).
+    fn row_product<const M: usize>(
+        h: &SMatrix<f64, M, D>,
+        a: &SMatrix<f64, D, D>,
+    ) -> SMatrix<f64, M, D> {
+        h * a
+    }
+
     /// Whether every stored number is finite.
     fn is_finite(&self) -> bool;
 

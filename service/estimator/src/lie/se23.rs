@@ -100,6 +100,14 @@ impl LieGroup<9> for SE23 {
     }
 
     #[inline]
+    fn row_product<const M: usize>(
+        h: &SMatrix<f64, M, 9>,
+        a: &SMatrix<f64, 9, 9>,
+    ) -> SMatrix<f64, M, 9> {
+        sek3::row_product::<M, 9, 9>(h, a)
+    }
+
+    #[inline]
     fn is_finite(&self) -> bool {
         self.rotation.is_finite()
             && self.velocity.iter().all(|entry| entry.is_finite())

@@ -78,6 +78,14 @@ impl LieGroup<6> for SE3 {
         sek3::congruence::<6, 6>(p, a);
     }
 
+    #[inline]
+    fn row_product<const M: usize>(
+        h: &SMatrix<f64, M, 6>,
+        a: &SMatrix<f64, 6, 6>,
+    ) -> SMatrix<f64, M, 6> {
+        sek3::row_product::<M, 6, 6>(h, a)
+    }
+
     fn is_finite(&self) -> bool {
         self.rotation.is_finite() && self.position.iter().all(|entry| entry.is_finite())
     }

@@ -4,7 +4,7 @@
 //! one 3x3 block along the diagonal, one block per vector down the first column, zero elsewhere. A direct product
 //! of such a group with a vector space has the same matrices, with the identity (in `ad` zero) on the latter.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, SMatrix, SVector, Vector3};
 
 use super::so3::{SO3, hat};
 use super::{LieGroup, series::RotationSeries};
@@ -157,4 +157,39 @@ pub(crate) fn congruence<const D: usize, const COUPLED: usize>(
             put(row, *entry);
         }
     }
+}
+
+/// `H A` for an arrow A on the first COUPLED of D coordinates and the identity on the others, passing over the blocks
+/// of H that are zero.
+#[inline]
+pub(crate) fn row_product<const M: usize, const D: usize, const COUPLED: usize>(
+    h: &SMatrix<f64, M, D>,
+    a: &SMatrix<f64, D, D>,
+) -> SMatrix<f64, M, D> {
+    const { assert!(COUPLED <= D && COUPLED.is_multiple_of(3)) };
+    let (h, a) = (&h.data.0, &a.data.0);
+    let mut product = *h;
+    for column in product.iter_mut().take(3) {
+        *column = [0.0; M];
+    }
+    for start in (0..COUPLED).step_by(3) {
+        let block = [h[start], h[start + 1], h[start + 2]];
+        if block == [[0.0; M]; 3] {
+            continue;
+        }
+        for j in 0..3 {
+            for row in 0..M {
+                let times = |a: &[f64; D]| {
+                    block[0][row] * a[start]
+                        + block[1][row] * a[start + 1]
+                        + block[2][row] * a[start + 2]
+                };
+                product[j][row] += times(&a[j]);
+                if start > 0 {
+                    product[start + j][row] = times(&a[start + j]);
+                }
+            }
+        }
+    }
+    SMatrix::from_array_storage(ArrayStorage(product))
 }

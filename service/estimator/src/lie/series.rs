@@ -162,7 +162,15 @@ impl RotationSeries {
         }
     }
 
+    /// The rotation vector, rad.
+    #[inline]
+    #[must_use]
+    pub fn phi(&self) -> &Vector3<f64> {
+        &self.phi
+    }
+
     /// The values `S_0 ..= S_6`.
+    #[inline]
     #[must_use]
     pub fn values(&self) -> &[f64; COUNT] {
         &self.s
@@ -178,16 +186,25 @@ impl RotationSeries {
     #[must_use]
     #[inline]
     pub fn gamma<const M: usize>(&self) -> Matrix3<f64> {
+        Matrix3::from(self.gamma_columns::<M>())
+    }
+
+    /// [`gamma`](Self::gamma) by columns.
+    #[inline(always)]
+    pub(crate) fn gamma_columns<const M: usize>(&self) -> [[f64; 3]; 3] {
         const { assert!(M <= 2) };
-        let p = &self.phi;
-        let (a, b, c) = (RECIPROCAL_FACTORIAL[M], self.s[M + 1], self.s[M + 2]);
+        let (b, c) = (self.s[M + 1], self.s[M + 2]);
         // hat(phi)^2 = phi phi^T - t I
-        let mut gamma = (c * p) * p.transpose() + hat(&(b * p));
-        let diagonal = a - c * p.norm_squared();
-        gamma[(0, 0)] += diagonal;
-        gamma[(1, 1)] += diagonal;
-        gamma[(2, 2)] += diagonal;
-        gamma
+        let diagonal = RECIPROCAL_FACTORIAL[M] - c * self.phi.norm_squared();
+        let [x, y, z] = [self.phi.x, self.phi.y, self.phi.z];
+        let [cx, cy, cz] = [c * x, c * y, c * z];
+        let [bx, by, bz] = [b * x, b * y, b * z];
+        let (xy, xz, yz) = (cx * y, cx * z, cy * z);
+        [
+            [diagonal + cx * x, xy + bz, xz - by],
+            [xy - bz, diagonal + cy * y, yz + bx],
+            [xz + by, yz - bx, diagonal + cz * z],
+        ]
     }
 
     /// The vector `Gamma_M(phi) a`, without forming the matrix.
@@ -205,6 +222,15 @@ impl RotationSeries {
     #[must_use]
     #[inline]
     pub fn gamma_times_derivative<const M: usize>(&self, a: &Vector3<f64>) -> Matrix3<f64> {
+        Matrix3::from(self.gamma_times_derivative_columns::<M>(a))
+    }
+
+    /// [`gamma_times_derivative`](Self::gamma_times_derivative) by columns.
+    #[inline(always)]
+    pub(crate) fn gamma_times_derivative_columns<const M: usize>(
+        &self,
+        a: &Vector3<f64>,
+    ) -> [[f64; 3]; 3] {
         const { assert!(M <= 2) };
         let p = &self.phi;
         let (b, c) = (self.s[M + 1], self.s[M + 2]);
@@ -213,13 +239,14 @@ impl RotationSeries {
         let p_p_a = p.cross(&p_a);
         // phi x (phi x a) changes by d x (phi x a) + phi x (d x a), and
         // hat(phi) hat(a) = a phi^T - (phi . a) I.
-        let mut derivative =
-            (2.0 * (db * p_a + dc * p_p_a) - c * a) * p.transpose() - hat(&(b * a + c * p_a));
+        let u = 2.0 * (db * p_a + dc * p_p_a) - c * a;
+        let w = b * a + c * p_a;
         let diagonal = c * p.dot(a);
-        derivative[(0, 0)] += diagonal;
-        derivative[(1, 1)] += diagonal;
-        derivative[(2, 2)] += diagonal;
-        derivative
+        [
+            [u.x * p.x + diagonal, u.y * p.x - w.z, u.z * p.x + w.y],
+            [u.x * p.y + w.z, u.y * p.y + diagonal, u.z * p.y - w.x],
+            [u.x * p.z - w.y, u.y * p.z + w.x, u.z * p.z + diagonal],
+        ]
     }
 
     /// The directional derivative of the matrix, `d/ds Gamma_M(phi + s rho)` at `s = 0`.

@@ -117,6 +117,14 @@ impl LieGroup<15> for TwoFrames {
         sek3::congruence::<15, 15>(p, a);
     }
 
+    #[inline]
+    fn row_product<const M: usize>(
+        h: &SMatrix<f64, M, 15>,
+        a: &SMatrix<f64, 15, 15>,
+    ) -> SMatrix<f64, M, 15> {
+        sek3::row_product::<M, 15, 15>(h, a)
+    }
+
     fn is_finite(&self) -> bool {
         let vectors = [
             self.velocity,

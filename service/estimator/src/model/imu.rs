@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::group_affine::{FreeMotion, GroupAffineStep};
 use super::increment::{ImuIncrement, moved};
+use crate::lanes::Block;
 use crate::lie::{LieGroup, SE23, SO3};
 
 /// How an interval with constant rates becomes a step.
@@ -115,12 +116,12 @@ impl ImuStep {
 
 impl From<&ImuIncrement> for ImuStep {
     fn from(increment: &ImuIncrement) -> Self {
-        let back = increment.turn_matrix.transpose();
+        let back = Matrix3::from(increment.turn_matrix).transpose();
         let mut input_jacobian = SMatrix::<f64, 9, 6>::zeros();
-        let mut place = |row, column, block: &Matrix3<f64>| {
+        let mut place = |row, column, block: &Block| {
             input_jacobian
                 .fixed_view_mut::<3, 3>(row, column)
-                .copy_from(&(back * block));
+                .copy_from(&(back * Matrix3::from(*block)));
         };
         for (row, block) in (0..).step_by(3).zip(&increment.by_rate) {
             place(row, 0, block);

@@ -11,10 +11,11 @@
 //! | velocity, world | `g dt` | `g dt` |
 //! | position, world | `g dt^2 / 2` | 0 |
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::imu::{Discretisation, ImuInput};
 use super::transition::Transition;
+use crate::lanes::{Block, Quad};
 use crate::lie::series::RotationSeries;
 use crate::lie::{LieGroup, SE23, SO3};
 
@@ -28,20 +29,101 @@ pub struct ImuIncrement {
     /// Orientation of the body at the end, seen from the start.
     pub turn: SO3,
     /// `turn` as a matrix.
-    pub turn_matrix: Matrix3<f64>,
+    pub(crate) turn_matrix: Block,
     /// Velocity and position gained by the specific force, body axes at the start: m/s, m.
     pub body: [Vector3<f64>; 2],
     /// Velocity and position gained by gravity, world axes: m/s, m.
     pub world: [Vector3<f64>; 2],
     /// What a change of the angular rate (rad/s) adds to rotation, velocity and position, axes of the start.
-    pub by_rate: [Matrix3<f64>; 3],
+    pub(crate) by_rate: [Block; 3],
     /// What a change of the specific force (m/s^2) adds to velocity and position, axes of the start.
-    pub by_force: [Matrix3<f64>; 2],
+    pub(crate) by_force: [Block; 2],
+    /// The products of these, axes of the start or of the end, between which the turn is about `phi`.
+    squares: Squares,
+}
+
+/// `N_0 N_0^T`, `A_1 A_1^T`, `A_2 A_1^T` and `A_2 A_2^T`, where N and A are what a change of the input adds (\[PAR\]
+/// (14), for noise that is equal on all axes): each is `a I + b hat(phi) + c phi phi^T`, since all are series in
+/// `hat(phi)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Squares {
+    /// The turn over the interval, rad, in the axes of the products.
+    phi: Vector3<f64>,
+    /// `(a, b, c)` of each.
+    coefficients: [[f64; 3]; 4],
+}
+
+impl Squares {
+    #[inline(always)]
+    fn new(series: &RotationSeries, dt_s: f64, discretisation: Discretisation) -> Self {
+        let [_, s_1, s_2, s_3, s_4, ..] = *series.values();
+        let phi = series.phi();
+        let t = phi.norm_squared();
+        let (dt_2, dt_3, dt_4) = (dt_s * dt_s, dt_s * dt_s * dt_s, dt_s * dt_s * dt_s * dt_s);
+        // Along phi Gamma_1 is 1 and Gamma_2 1/2; across it they are S_1 + i theta S_2 and S_2 + i theta S_3; of
+        // these the products with conjugates, without the differences of nearly equal numbers.
+        let rate = [2.0 * s_2 * dt_2, 0.0, 2.0 * s_4 * dt_2];
+        let by_force = match discretisation {
+            Discretisation::Euler => [[dt_2, 0.0, 0.0], [0.0; 3], [0.0; 3]],
+            Discretisation::ZeroOrderHold => [
+                rate,
+                [
+                    (s_1 * s_2 + t * s_2 * s_3) * dt_3,
+                    (s_1 * s_3 - s_2 * s_2) * dt_3,
+                    (s_4 + 0.5 * s_3 - s_3 * (t * s_4 + s_2)) * dt_3,
+                ],
+                [
+                    (s_2 * s_2 + t * s_3 * s_3) * dt_4,
+                    0.0,
+                    (s_4 - t * s_4 * s_4 - s_3 * s_3) * dt_4,
+                ],
+            ],
+        };
+        let [first, both, second] = by_force;
+        Self {
+            phi: *phi,
+            coefficients: [rate, first, both, second],
+        }
+    }
+
+    /// The same in other axes, to which `r_wb` leads.
+    #[inline(always)]
+    fn turned(&self, r_wb: Block) -> Self {
+        Self {
+            phi: r_wb.apply(&self.phi),
+            ..*self
+        }
+    }
+
+    /// The four products.
+    #[inline(always)]
+    pub(crate) fn blocks(&self) -> [Block; 4] {
+        let [rate, first, both, second] = self.coefficients;
+        [
+            self.block(rate),
+            self.block(first),
+            self.block(both),
+            self.block(second),
+        ]
+    }
+
+    #[inline(always)]
+    fn block(&self, [a, b, c]: [f64; 3]) -> Block {
+        let [x, y, z] = [self.phi.x, self.phi.y, self.phi.z];
+        let [cx, cy, cz] = [c * x, c * y, c * z];
+        let [bx, by, bz] = [b * x, b * y, b * z];
+        let (xy, xz, yz) = (cx * y, cx * z, cy * z);
+        Block::from_columns([
+            [a + cx * x, xy + bz, xz - by],
+            [xy - bz, a + cy * y, yz + bx],
+            [xz + by, yz - bx, a + cz * z],
+        ])
+    }
 }
 
 impl ImuIncrement {
     /// The motion over `dt_s` seconds with the bias-free `input` under gravity `g_w`, m/s^2.
-    #[inline]
+    #[inline(always)]
     pub fn new(
         input: &ImuInput,
         g_w: &Vector3<f64>,
@@ -51,30 +133,35 @@ impl ImuIncrement {
         let phi = input.omega_b * dt_s;
         let force_b = &input.force_b;
         let series = RotationSeries::at(&phi);
-        let gamma_1 = series.gamma::<1>();
         let nothing = Vector3::zeros();
-        let no_effect = Matrix3::zeros();
-        let by_rate_rotation = gamma_1 * dt_s;
+        let by_rate_rotation = Block::from_columns(series.gamma_columns::<1>()).scaled(dt_s);
         let (body, world, by_rate, by_force) = match discretisation {
             Discretisation::Euler => (
                 [force_b * dt_s, nothing],
                 [g_w * dt_s, nothing],
-                [by_rate_rotation, no_effect, no_effect],
-                [Matrix3::identity() * dt_s, no_effect],
+                [by_rate_rotation, Block::zeros(), Block::zeros()],
+                [Block::diagonal(dt_s), Block::zeros()],
             ),
             Discretisation::ZeroOrderHold => {
                 // Gamma_m(omega dt) a dt^m in its two arguments; one more dt from phi = omega dt.
                 let (first, second) = (dt_s, dt_s * dt_s);
-                let velocity = series.gamma_times_derivative::<1>(force_b) * (first * dt_s);
-                let position = series.gamma_times_derivative::<2>(force_b) * (second * dt_s);
+                let velocity = series.gamma_times_derivative_columns::<1>(force_b);
+                let position = series.gamma_times_derivative_columns::<2>(force_b);
                 (
                     [
                         series.gamma_times::<1>(force_b) * first,
                         series.gamma_times::<2>(force_b) * second,
                     ],
                     [g_w * first, g_w * (0.5 * second)],
-                    [by_rate_rotation, velocity, position],
-                    [by_rate_rotation, series.gamma::<2>() * second],
+                    [
+                        by_rate_rotation,
+                        Block::from_columns(velocity).scaled(first * dt_s),
+                        Block::from_columns(position).scaled(second * dt_s),
+                    ],
+                    [
+                        by_rate_rotation,
+                        Block::from_columns(series.gamma_columns::<2>()).scaled(second),
+                    ],
                 )
             }
         };
@@ -82,78 +169,84 @@ impl ImuIncrement {
             input: *input,
             dt_s,
             turn: SO3::exp(&phi),
-            turn_matrix: series.gamma::<0>(),
+            turn_matrix: Block::from_columns(series.gamma_columns::<0>()),
             body,
             world,
             by_rate,
             by_force,
+            squares: Squares::new(&series, dt_s, discretisation),
         }
     }
 
     /// Where the motion takes `pose`: `W phi(pose) U`, without the products by what is known to be neutral.
-    #[inline]
+    #[inline(always)]
     pub fn apply(&self, pose: &SE23) -> SE23 {
         moved(pose, self.dt_s, &self.turn, &self.body, &self.world)
     }
 
     /// How the left-invariant error moves, `chi = chi_hat exp(xi)`: seen from the body, which turns.
-    #[inline]
+    #[inline(always)]
     pub fn left_transition(&self) -> Transition {
+        let back = self.turn_matrix.transpose();
+        let [rotation, velocity, position] = self.by_rate;
+        let [by_velocity, by_position] = self.by_force;
         Transition {
             dt_s: self.dt_s,
-            turn: Some(self.turn_matrix.transpose()),
+            turn: Some(back),
             couplings: [-self.body[0], -self.body[1]],
-            by_rate: self.by_rate,
-            by_force: self.by_force,
+            by_rate: [
+                // Exp(-phi) Gamma_1(phi) = Gamma_1(-phi)
+                rotation.transpose(),
+                back.times(velocity),
+                back.times(position),
+            ],
+            by_force: [back.times(by_velocity), back.times(by_position)],
+            squares: self.squares,
         }
     }
 
     /// How the right-invariant error moves, `chi = exp(xi) chi_hat`: gravity alone couples it, and the noise
     /// enters as \[PAR\] (14) has it, by the adjoint of `after`, the pose at the end; `before` is that at the
     /// start.
-    #[inline]
+    #[inline(always)]
     pub fn right_transition(&self, before: &SE23, after: &SE23) -> Transition {
-        let r_wb = before.rotation.matrix();
-        let [rotation, velocity, position] = self.by_rate.map(|block| r_wb * block);
+        let r_wb = Block::rotation(&before.rotation);
+        let [rotation, velocity, position] = self.by_rate;
+        let [by_velocity, by_position] = self.by_force;
+        let rotation = r_wb.times(rotation);
         Transition {
             dt_s: self.dt_s,
             turn: None,
             couplings: self.world,
             by_rate: [
                 rotation,
-                velocity + crossed(&after.velocity, &rotation),
-                position + crossed(&after.position, &rotation),
+                r_wb.times(velocity) + rotation.crossed_by(Quad::from(&after.velocity)),
+                r_wb.times(position) + rotation.crossed_by(Quad::from(&after.position)),
             ],
-            by_force: self.by_force.map(|block| r_wb * block),
+            by_force: [r_wb.times(by_velocity), r_wb.times(by_position)],
+            squares: self.squares.turned(r_wb),
         }
     }
 
     /// How the additive error of the EKF moves, every part of it in world axes; `before` is the pose at the
     /// start.
-    #[inline]
+    #[inline(always)]
     pub fn additive_transition(&self, before: &SE23) -> Transition {
-        let r_wb = before.rotation.matrix();
+        let r_wb = Block::rotation(&before.rotation);
         Transition {
             dt_s: self.dt_s,
             turn: None,
-            couplings: self.body.map(|part| -(r_wb * part)),
-            by_rate: self.by_rate.map(|block| r_wb * block),
-            by_force: self.by_force.map(|block| r_wb * block),
+            couplings: self.body.map(|part| -r_wb.apply(&part)),
+            by_rate: self.by_rate.map(|block| r_wb.times(block)),
+            by_force: self.by_force.map(|block| r_wb.times(block)),
+            squares: self.squares.turned(r_wb),
         }
     }
 }
 
-/// `hat(a) block`.
-fn crossed(a: &Vector3<f64>, block: &Matrix3<f64>) -> Matrix3<f64> {
-    Matrix3::from_fn(|i, column| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        a[j] * block[(k, column)] - a[k] * block[(j, column)]
-    })
-}
-
 /// `pose` after free motion for `dt_s`, the increments `world` (world axes) and `body` (body axes at the
 /// start), each of velocity and position, and the rotation `turn`.
-#[inline]
+#[inline(always)]
 pub(super) fn moved(
     pose: &SE23,
     dt_s: f64,

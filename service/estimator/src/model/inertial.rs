@@ -24,7 +24,7 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
     fn from_parts(pose: SE23, gyro_bias: Vector3<f64>, accel_bias: Vector3<f64>) -> Self;
 
     /// The state after one increment; biases stay.
-    #[inline]
+    #[inline(always)]
     fn moved(&self, increment: &ImuIncrement) -> Self {
         Self::from_parts(
             increment.apply(self.pose()),
@@ -56,7 +56,7 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
     }
 
     /// The motion that the raw sample `measured` says, the biases of this state removed.
-    #[inline]
+    #[inline(always)]
     fn increment(
         &self,
         measured: &ImuInput,
@@ -104,6 +104,7 @@ impl InertialState<9> for SE23 {
         pose
     }
 
+    #[inline(always)]
     fn carry(transition: &Transition, p: &mut SMatrix<f64, 9, 9>, noise: &ImuNoise) {
         transition.carry(p, noise);
     }

@@ -104,6 +104,14 @@ impl LieGroup<15> for NavState {
     }
 
     #[inline]
+    fn row_product<const M: usize>(
+        h: &SMatrix<f64, M, 15>,
+        a: &SMatrix<f64, 15, 15>,
+    ) -> SMatrix<f64, M, 15> {
+        sek3::row_product::<M, 15, 9>(h, a)
+    }
+
+    #[inline]
     fn is_finite(&self) -> bool {
         self.pose.is_finite()
             && self.gyro_bias.iter().all(|value| value.is_finite())
@@ -144,6 +152,7 @@ impl InertialState<15> for NavState {
         }
     }
 
+    #[inline(always)]
     fn carry(transition: &Transition, p: &mut Matrix15, noise: &ImuNoise) {
         transition.carry(p, noise);
     }

@@ -1,25 +1,25 @@
 //! One interval's effect on the error of an inertial state, by blocks of three: `P+ = F P F^T + Q` at a
-//! quarter of the dense cost.
+//! fifth of the dense cost.
 //!
 //! With rotation, velocity, position and biases `(phi, nu, rho, b_g, b_a)`, both noises entering as the biases
 //! do, the error moves by
 //!
 //! ```text
-//! phi+ = E (phi                          - N_0 b_g)
-//! nu+  = E (nu  + c_1 x phi              - N_1 b_g - A_1 b_a)
-//! rho+ = E (rho + c_2 x phi  + dt nu     - N_2 b_g - A_2 b_a)
+//! phi+ = E  phi                         - N_0 b_g
+//! nu+  = E (nu  + c_1 x phi)            - N_1 b_g - A_1 b_a
+//! rho+ = E (rho + c_2 x phi  + dt nu)   - N_2 b_g - A_2 b_a
 //! ```
 //!
 //! on every side of the estimate ([`filter::Side`](crate::filter::Side) gives the blocks; E is the identity on
-//! some). F is never formed: `T = P F^T` combines whole columns of P, and of `F T` the part on the biases is T
-//! itself, so that only the upper triangle of the pose is left to do; E comes last, block by block. The noise,
-//! as large as a bias of covariance `psd / dt`, joins T in between.
-//! [`propagate_dense`](crate::filter::propagate_dense) is the reference.
+//! some). F is never formed: these lines are applied to two columns of P at a time, and then, P being symmetric, to
+//! two rows of the result, as far as the diagonal. The noise, as large as a bias of covariance `psd / dt`, joins them
+//! in between. [`propagate_dense`](crate::filter::propagate_dense) is the reference.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::imu::{ImuInput, ImuNoise};
-use crate::columns::{Column, combined};
+use super::increment::Squares;
+use crate::lanes::{Block, Pair};
 
 /// F and the shape of Q of one interval, in the error of one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,29 +27,21 @@ pub struct Transition {
     /// Length of the interval, s.
     pub dt_s: f64,
     /// E; `None` for the identity.
-    pub turn: Option<Matrix3<f64>>,
+    pub(crate) turn: Option<Block>,
     /// `c_1`, m/s, and `c_2`, m.
     pub couplings: [Vector3<f64>; 2],
     /// `N_0`, `N_1` and `N_2`: a change of the angular rate, rad/s.
-    pub by_rate: [Matrix3<f64>; 3],
+    pub(crate) by_rate: [Block; 3],
     /// `A_1` and `A_2`: a change of the specific force, m/s^2.
-    pub by_force: [Matrix3<f64>; 2],
+    pub(crate) by_force: [Block; 2],
+    /// `N_0 N_0^T` and `A_j A_i^T`.
+    pub(crate) squares: Squares,
 }
 
 /// How many of the coordinates are the pose; the biases begin after them.
 const POSE: usize = 9;
 /// How many inputs are noisy, and how many biases there are: three rates and three forces.
 const INPUTS: usize = 6;
-
-/// `E (a, b, c)`.
-#[inline(always)]
-fn times(e: &Matrix3<f64>, a: f64, b: f64, c: f64) -> [f64; 3] {
-    [
-        e[(0, 0)] * a + e[(0, 1)] * b + e[(0, 2)] * c,
-        e[(1, 0)] * a + e[(1, 1)] * b + e[(1, 2)] * c,
-        e[(2, 0)] * a + e[(2, 1)] * b + e[(2, 2)] * c,
-    ]
-}
 
 impl Transition {
     /// Where the error `xi` is after the interval, if the input was off by `disturbance` (rad/s, m/s^2): `F xi + B d`
@@ -68,17 +60,20 @@ impl Transition {
         }
         let (phi, nu, rho) = (part(0), part(3), part(6));
         let [c_1, c_2] = &self.couplings;
-        let [n_0, n_1, n_2] = &self.by_rate;
-        let [a_1, a_2] = &self.by_force;
-        let before_turn = [
-            phi + n_0 * rate,
-            nu + c_1.cross(&phi) + n_1 * rate + a_1 * force,
-            rho + c_2.cross(&phi) + nu * self.dt_s + n_2 * rate + a_2 * force,
+        let [by_rate_0, by_rate_1, by_rate_2] = self.by_rate.map(|n| n.apply(&rate));
+        let [by_force_1, by_force_2] = self.by_force.map(|a| a.apply(&force));
+        let free = [
+            phi,
+            nu + c_1.cross(&phi),
+            rho + c_2.cross(&phi) + nu * self.dt_s,
         ];
+        let by_input = [by_rate_0, by_rate_1 + by_force_1, by_rate_2 + by_force_2];
         let mut moved = *xi;
-        for (first, part) in (0..).step_by(3).zip(before_turn) {
-            let turned = self.turn.map_or(part, |e| e * part);
-            moved.fixed_rows_mut::<3>(first).copy_from(&turned);
+        for (block, (free, by_input)) in free.into_iter().zip(by_input).enumerate() {
+            let turned = self.turn.map_or(free, |e| e.apply(&free));
+            moved
+                .fixed_rows_mut::<3>(3 * block)
+                .copy_from(&(turned + by_input));
         }
         moved
     }
@@ -88,18 +83,45 @@ impl Transition {
     pub(super) fn carry<const D: usize>(&self, p: &mut SMatrix<f64, D, D>, noise: &ImuNoise) {
         const { assert!(D == POSE || D == POSE + INPUTS) };
         let p = &mut p.data.0;
-        let inputs = self.input_columns();
-        let mut t = self.times_transposed(p, &inputs);
-        let densities = self.densities(noise);
-        let mut pose = [[0.0; POSE]; POSE];
-        for i in 0..3 {
-            pose[i] = self.rows::<D, 3>(&t[i], &inputs, &densities, i);
-            pose[3 + i] = self.rows::<D, 6>(&t[3 + i], &inputs, &densities, 3 + i);
-            pose[6 + i] = self.rows::<D, 9>(&t[6 + i], &inputs, &densities, 6 + i);
-        }
-        self.turn_blocks(&pose, p);
+        let lines = Lines::new(self);
+        // P F^T, two rows at a time: the lines applied to two columns of the symmetric P. Of the pose, what the upper
+        // triangle of the result needs. In loops: unrolled, the code outgrows what the processor holds decoded. The
+        // last two of an odd number of rows come first: then every pair that is read was written as one.
+        let mut t = [[0.0; D]; POSE];
         if D > POSE {
-            self.turn_rows_of_biases(&mut t);
+            for row in [13, 0, 2, 8, 10, 12] {
+                lines.carry_rows::<D, 0>(p, row, &mut t);
+            }
+            lines.carry_rows::<D, 1>(p, 4, &mut t);
+            lines.carry_rows::<D, 2>(p, 6, &mut t);
+        } else {
+            for row in [0, 2] {
+                lines.carry_rows::<D, 0>(p, row, &mut t);
+            }
+            lines.carry_rows::<D, 1>(p, 4, &mut t);
+            for row in [7, 6] {
+                lines.carry_rows::<D, 2>(p, row, &mut t);
+            }
+        }
+        // F (P F^T) + Q, two columns at a time, as far as the diagonal.
+        if D > POSE {
+            let white = self.white(noise);
+            lines.carry_columns_with_biases::<D, 1>(&t, &white[0], 0, p);
+            for (column, white) in [2, 4].into_iter().zip(&white[1..3]) {
+                lines.carry_columns_with_biases::<D, 2>(&t, white, column, p);
+            }
+            for (column, white) in [6, 7].into_iter().zip(&white[3..5]) {
+                lines.carry_columns_with_biases::<D, 3>(&t, white, column, p);
+            }
+        } else {
+            let q = self.noise_covariance(noise);
+            lines.carry_columns::<D, 1>(&t, &q, 0, p);
+            lines.carry_columns::<D, 2>(&t, &q, 2, p);
+            lines.carry_columns::<D, 2>(&t, &q, 4, p);
+            lines.carry_columns::<D, 3>(&t, &q, 6, p);
+            lines.carry_columns::<D, 3>(&t, &q, 7, p);
+        }
+        if D > POSE {
             for column in 0..POSE {
                 for row in POSE..D {
                     p[column][row] = t[column][row];
@@ -113,173 +135,264 @@ impl Transition {
         }
     }
 
-    /// The covariance of each input over the interval, were it constant: `psd / dt`.
+    /// The covariances of each rate and of each force over the interval, were they constant: `psd / dt`.
     #[inline(always)]
-    fn densities(&self, noise: &ImuNoise) -> [f64; INPUTS] {
+    fn densities(&self, noise: &ImuNoise) -> (f64, f64) {
         // Over no time there is no noise, and no quotient.
         let rate = if self.dt_s > 0.0 {
             1.0 / self.dt_s
         } else {
             0.0
         };
-        let (gyro, accel) = (noise.gyro_psd * rate, noise.accel_psd * rate);
-        [gyro, gyro, gyro, accel, accel, accel]
+        (noise.gyro_psd * rate, noise.accel_psd * rate)
     }
 
-    /// What each input adds to the pose, before the turn: the columns of `[N_0 0; N_1 A_1; N_2 A_2]`.
+    /// The covariance of the noise of each input with what it adds to the pose, `diag(psd / dt)` times the transpose
+    /// of `[N_0 0; N_1 A_1; N_2 A_2]`: of the inputs in turn, in two coordinates of the pose from 0, 2, 4, 6 and 7 on.
     #[inline(always)]
-    fn input_columns(&self) -> [Column<POSE>; INPUTS] {
-        let mut columns = [[0.0; POSE]; INPUTS];
+    fn white(&self, noise: &ImuNoise) -> [[Pair; INPUTS]; 5] {
+        let (gyro, accel) = self.densities(noise);
+        let [n_0, n_1, n_2] = self.by_rate;
+        let [a_1, a_2] = self.by_force;
+        let [n_0, n_1, n_2] = [
+            n_0.scaled(gyro).entries(),
+            n_1.scaled(gyro).entries(),
+            n_2.scaled(gyro).entries(),
+        ];
+        let [a_1, a_2] = [a_1.scaled(accel).entries(), a_2.scaled(accel).entries()];
+        let mut white = [[Pair::splat(0.0); INPUTS]; 5];
         for n in 0..3 {
-            for i in 0..3 {
-                columns[n][i] = self.by_rate[0][(i, n)];
-                columns[n][3 + i] = self.by_rate[1][(i, n)];
-                columns[n][6 + i] = self.by_rate[2][(i, n)];
-                columns[3 + n][3 + i] = self.by_force[0][(i, n)];
-                columns[3 + n][6 + i] = self.by_force[1][(i, n)];
-            }
+            white[0][n] = Pair::new(n_0[n][0], n_0[n][1]);
+            white[1][n] = Pair::new(n_0[n][2], n_1[n][0]);
+            white[2][n] = Pair::new(n_1[n][1], n_1[n][2]);
+            white[3][n] = Pair::new(n_2[n][0], n_2[n][1]);
+            white[4][n] = Pair::new(n_2[n][1], n_2[n][2]);
+            white[1][3 + n] = Pair::new(0.0, a_1[n][0]);
+            white[2][3 + n] = Pair::new(a_1[n][1], a_1[n][2]);
+            white[3][3 + n] = Pair::new(a_2[n][0], a_2[n][1]);
+            white[4][3 + n] = Pair::new(a_2[n][1], a_2[n][2]);
         }
-        columns
+        white
     }
 
-    /// The columns of the pose in `P F^T`, before the turn.
+    /// Q on the pose, the blocks of its lower triangle, by columns; zero above.
     #[inline(always)]
-    fn times_transposed<const D: usize>(
-        &self,
-        p: &[Column<D>; D],
-        inputs: &[Column<POSE>; INPUTS],
-    ) -> [Column<D>; POSE] {
-        let [c_1, c_2] = &self.couplings;
-        let mut t = [[0.0; D]; POSE];
+    fn noise_covariance(&self, noise: &ImuNoise) -> [Column; POSE] {
+        let (gyro, accel) = self.densities(noise);
+        let [n_0, n_1, n_2] = self.by_rate;
+        let [s_0, s_1, s_2] = [n_0.scaled(gyro), n_1.scaled(gyro), n_2.scaled(gyro)];
+        let [rate, first, both, second] = self.squares.blocks();
+        let mut q = [[0.0; POSE]; POSE];
+        put(&mut q, 0, 0, rate.scaled(gyro));
+        put(&mut q, 3, 0, n_1.times_transposed(s_0));
+        put(&mut q, 6, 0, n_2.times_transposed(s_0));
+        put(
+            &mut q,
+            3,
+            3,
+            n_1.times_transposed(s_1) + first.scaled(accel),
+        );
+        put(&mut q, 6, 3, n_2.times_transposed(s_1) + both.scaled(accel));
+        put(
+            &mut q,
+            6,
+            6,
+            n_2.times_transposed(s_2) + second.scaled(accel),
+        );
+        q
+    }
+}
+
+/// A column of the pose.
+type Column = [f64; POSE];
+
+#[inline(always)]
+fn put(matrix: &mut [Column; POSE], row: usize, column: usize, block: Block) {
+    let entries = block.entries();
+    for j in 0..3 {
         for i in 0..3 {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            // (c x phi)_i = c_j phi_k - c_k phi_j
-            let (phi_j, phi_k, nu) = (&p[j], &p[k], &p[3 + i]);
-            if D == POSE {
-                t[i] = p[i];
-                t[3 + i] = combined::<D, _, _, _, _>(nu, [c_1[j], -c_1[k]], [phi_k, phi_j]);
-                let factors = [self.dt_s, c_2[j], -c_2[k]];
-                t[6 + i] = combined::<D, _, _, _, _>(&p[6 + i], factors, [nu, phi_k, phi_j]);
-            } else {
-                let b = |n: usize| &p[POSE + n];
-                let f = |n: usize, row: usize| -inputs[n][row];
-                t[i] = combined::<D, _, _, _, _>(
-                    &p[i],
-                    [f(0, i), f(1, i), f(2, i)],
-                    [b(0), b(1), b(2)],
-                );
-                let r = 3 + i;
-                t[r] = combined::<D, _, _, _, _>(
-                    nu,
-                    [
-                        c_1[j],
-                        -c_1[k],
-                        f(0, r),
-                        f(1, r),
-                        f(2, r),
-                        f(3, r),
-                        f(4, r),
-                        f(5, r),
-                    ],
-                    [phi_k, phi_j, b(0), b(1), b(2), b(3), b(4), b(5)],
-                );
-                let r = 6 + i;
-                t[r] = combined::<D, _, _, _, _>(
-                    &p[r],
-                    [
-                        self.dt_s,
-                        c_2[j],
-                        -c_2[k],
-                        f(0, r),
-                        f(1, r),
-                        f(2, r),
-                        f(3, r),
-                        f(4, r),
-                        f(5, r),
-                    ],
-                    [nu, phi_k, phi_j, b(0), b(1), b(2), b(3), b(4), b(5)],
-                );
-            }
+            matrix[column + j][row + i] = entries[j][i];
         }
-        t
+    }
+}
+
+/// A 3 x 3 matrix by columns, each entry twice.
+type Twice = [[Pair; 3]; 3];
+
+/// The lines of a transition, ready for two errors at a time.
+struct Lines {
+    dt_s: Pair,
+    turn: Option<Twice>,
+    couplings: [[Pair; 3]; 2],
+    by_rate: [Twice; 3],
+    by_force: [Twice; 2],
+}
+
+#[inline(always)]
+fn twice(block: Block) -> Twice {
+    let entries = block.entries();
+    let mut twice = [[Pair::splat(0.0); 3]; 3];
+    for j in 0..3 {
+        for i in 0..3 {
+            twice[j][i] = Pair::splat(entries[j][i]);
+        }
+    }
+    twice
+}
+
+/// Two columns of `(P F^T)^T`, from `column` on.
+#[inline(always)]
+fn two_columns<const D: usize>(t: &[[f64; D]; POSE], column: usize) -> [Pair; D] {
+    let (first, second) = (&t[column], &t[column + 1]);
+    let mut xi = [Pair::splat(0.0); D];
+    for half in 0..D / 2 {
+        let k = 2 * half;
+        let [even, odd] = Pair::load(first, k).transposed(Pair::load(second, k));
+        xi[k] = even;
+        xi[k + 1] = odd;
+    }
+    xi[D - 1] = Pair::new(first[D - 1], second[D - 1]);
+    xi
+}
+
+/// Puts two columns from `column` on, as far as the diagonal, into the symmetric P.
+#[inline(always)]
+fn put_columns<const D: usize>(columns: &[Pair; POSE], column: usize, p: &mut [[f64; D]; D]) {
+    for row in 0..column + 2 {
+        let [first, second] = columns[row].entries();
+        if row <= column {
+            p[row][column] = first;
+            p[column][row] = first;
+        }
+        p[row][column + 1] = second;
+        p[column + 1][row] = second;
+    }
+}
+
+impl Lines {
+    #[inline(always)]
+    fn new(transition: &Transition) -> Self {
+        let [c_1, c_2] = &transition.couplings;
+        let [n_0, n_1, n_2] = transition.by_rate;
+        let [a_1, a_2] = transition.by_force;
+        Self {
+            dt_s: Pair::splat(transition.dt_s),
+            turn: transition.turn.map(twice),
+            couplings: [
+                [Pair::splat(c_1.x), Pair::splat(c_1.y), Pair::splat(c_1.z)],
+                [Pair::splat(c_2.x), Pair::splat(c_2.y), Pair::splat(c_2.z)],
+            ],
+            by_rate: [twice(n_0), twice(n_1), twice(n_2)],
+            by_force: [twice(a_1), twice(a_2)],
+        }
     }
 
-    /// The first rows of `F T` in one column, before the turn; the ROWS of them that are not zero reach the
-    /// diagonal. What the white noise of the input adds comes in as if it were a bias of covariance `psd / dt`.
+    /// Two rows of `P F^T` from the block FROM on, in T.
     #[inline(always)]
-    fn rows<const D: usize, const ROWS: usize>(
+    fn carry_rows<const D: usize, const FROM: usize>(
         &self,
-        t: &Column<D>,
-        inputs: &[Column<POSE>; INPUTS],
-        densities: &[f64; INPUTS],
+        p: &[[f64; D]; D],
+        row: usize,
+        t: &mut [[f64; D]; POSE],
+    ) {
+        let mut xi = [Pair::splat(0.0); D];
+        for k in 0..D {
+            xi[k] = Pair::load(&p[k], row);
+        }
+        let mut moved = self.moved_freely::<D, FROM, 3>(&xi);
+        if D > POSE {
+            let mut biases = [Pair::splat(0.0); INPUTS];
+            biases.copy_from_slice(&xi[POSE..]);
+            self.subtract::<FROM, 3>(&mut moved, &biases);
+        }
+        for k in 3 * FROM..POSE {
+            moved[k].store(&mut t[k], row);
+        }
+    }
+
+    /// Two columns of `F T + Q` as far as the diagonal, in the first BLOCKS blocks, and the same entries of two rows.
+    #[inline(always)]
+    fn carry_columns<const D: usize, const BLOCKS: usize>(
+        &self,
+        t: &[[f64; D]; POSE],
+        q: &[Column; POSE],
         column: usize,
-    ) -> Column<POSE> {
-        let [c_1, c_2] = &self.couplings;
-        let mut rows = [0.0; POSE];
-        rows[..ROWS].copy_from_slice(&t[..ROWS]);
-        for i in 0..3 {
-            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            if ROWS > 3 {
-                rows[3 + i] += c_1[j] * t[k] - c_1[k] * t[j];
-            }
-            if ROWS > 6 {
-                rows[6 + i] += c_2[j] * t[k] - c_2[k] * t[j] + self.dt_s * t[3 + i];
-            }
+        p: &mut [[f64; D]; D],
+    ) {
+        let xi = two_columns(t, column);
+        let mut moved = self.moved_freely::<D, 0, BLOCKS>(&xi);
+        for row in 0..column + 2 {
+            moved[row] = moved[row] + Pair::load(&q[row], column);
         }
-        let less = |n: usize| {
-            let known = if D > POSE { t[POSE + n] } else { 0.0 };
-            densities[n] * inputs[n][column] - known
-        };
-        let [rate_x, rate_y, rate_z, force_x, force_y, force_z] = inputs;
-        // The forces do not act on the rotation.
-        if ROWS > 3 {
-            let factors = [less(0), less(1), less(2), less(3), less(4), less(5)];
-            let columns = [rate_x, rate_y, rate_z, force_x, force_y, force_z];
-            combined::<ROWS, _, _, _, _>(&rows, factors, columns)
-        } else {
-            let factors = [less(0), less(1), less(2)];
-            combined::<ROWS, _, _, _, _>(&rows, factors, [rate_x, rate_y, rate_z])
-        }
+        put_columns(&moved, column, p);
     }
 
-    /// Puts `E X E^T` for each block X of the upper triangle of `pose` into P, and its transpose below.
+    /// The same where there are biases, as which the noise comes in: `white` is its covariance with the two columns.
     #[inline(always)]
-    fn turn_blocks<const D: usize>(&self, pose: &[Column<POSE>; POSE], p: &mut [Column<D>; D]) {
-        for (top, left) in [(0, 0), (0, 3), (0, 6), (3, 3), (3, 6), (6, 6)] {
-            let x = |i: usize, j: usize| pose[left + j][top + i];
-            let columns = match &self.turn {
-                Some(e) => {
-                    // The rows of X E^T, then the columns of E times that.
-                    let row = |i: usize| times(e, x(i, 0), x(i, 1), x(i, 2));
-                    let half = [row(0), row(1), row(2)];
-                    let column = |j: usize| times(e, half[0][j], half[1][j], half[2][j]);
-                    [column(0), column(1), column(2)]
+    fn carry_columns_with_biases<const D: usize, const BLOCKS: usize>(
+        &self,
+        t: &[[f64; D]; POSE],
+        white: &[Pair; INPUTS],
+        column: usize,
+        p: &mut [[f64; D]; D],
+    ) {
+        let xi = two_columns(t, column);
+        let mut biases = [Pair::splat(0.0); INPUTS];
+        for n in 0..INPUTS {
+            biases[n] = xi[POSE + n] - white[n];
+        }
+        let mut moved = self.moved_freely::<D, 0, BLOCKS>(&xi);
+        self.subtract::<0, BLOCKS>(&mut moved, &biases);
+        put_columns(&moved, column, p);
+    }
+
+    /// What the biases do to the pose, in the blocks FROM..END.
+    #[inline(always)]
+    fn subtract<const FROM: usize, const END: usize>(
+        &self,
+        pose: &mut [Pair; POSE],
+        biases: &[Pair; INPUTS],
+    ) {
+        for block in FROM..END {
+            for i in 0..3 {
+                let mut entry = pose[3 * block + i];
+                let [x, y, z] = &self.by_rate[block];
+                entry = entry - x[i] * biases[0] - y[i] * biases[1] - z[i] * biases[2];
+                if block > 0 {
+                    let [x, y, z] = &self.by_force[block - 1];
+                    entry = entry - x[i] * biases[3] - y[i] * biases[4] - z[i] * biases[5];
                 }
-                None => {
-                    let column = |j: usize| [x(0, j), x(1, j), x(2, j)];
-                    [column(0), column(1), column(2)]
-                }
-            };
-            for (j, column) in columns.iter().enumerate() {
-                // Of a block on the diagonal the upper triangle counts.
-                let rows = if top == left { j + 1 } else { 3 };
-                for (i, entry) in column.iter().enumerate().take(rows) {
-                    p[left + j][top + i] = *entry;
-                    p[top + i][left + j] = *entry;
-                }
+                pose[3 * block + i] = entry;
             }
         }
     }
 
-    /// Each block of three columns times `E^T`, in the rows of the biases.
+    /// The part of `F xi` that does not come from the biases, in the blocks FROM..END; zero in the others.
     #[inline(always)]
-    fn turn_rows_of_biases<const D: usize>(&self, t: &mut [Column<D>; POSE]) {
-        let Some(e) = &self.turn else { return };
-        for block in t.chunks_exact_mut(3) {
-            let [x, y, z] = block else { continue };
-            for row in POSE..D {
-                [x[row], y[row], z[row]] = times(e, x[row], y[row], z[row]);
+    fn moved_freely<const D: usize, const FROM: usize, const END: usize>(
+        &self,
+        xi: &[Pair; D],
+    ) -> [Pair; POSE] {
+        let mut moved = [Pair::splat(0.0); POSE];
+        for block in FROM..END {
+            let mut part = [xi[3 * block], xi[3 * block + 1], xi[3 * block + 2]];
+            if block > 0 {
+                let c = &self.couplings[block - 1];
+                for i in 0..3 {
+                    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                    if block > 1 {
+                        part[i] = part[i] + xi[3 + i] * self.dt_s;
+                    }
+                    part[i] = part[i] + c[j] * xi[k] - c[k] * xi[j];
+                }
+            }
+            for i in 0..3 {
+                moved[3 * block + i] = match &self.turn {
+                    Some(e) => e[0][i] * part[0] + e[1][i] * part[1] + e[2][i] * part[2],
+                    None => part[i],
+                };
             }
         }
+        moved
     }
 }

@@ -140,10 +140,9 @@ impl Track {
         let turned = self.times_transposed::<9, 3, 6>(&across);
         result.change_symmetrically(|result| {
             result.copy_from(q);
-            for column in 0..9 {
-                let sum = &mut result.data.0[column];
+            for (column, (sum, turned)) in result.data.0.iter_mut().zip(&turned).enumerate() {
                 for row in 0..=column {
-                    sum[row] += turned[column][row];
+                    sum[row] += turned[row];
                 }
             }
             if D > 9 {

@@ -1,6 +1,7 @@
 //! `[smoother]`: how much of the past is smoothed, and how.
 
 use super::choice::{Estimator, Jacobians, Parametrisation, Prior};
+use super::interval::Interval;
 use super::section::Section;
 
 /// Why a key of the filters is refused.
@@ -19,6 +20,8 @@ pub struct Smoother {
     pub parametrisation: Parametrisation,
     /// The derivatives of the residuals.
     pub jacobians: Jacobians,
+    /// Once the heading is known this well (standard deviation, degrees) the filter goes on alone; `None`: never.
+    pub hand_over_deg: Option<f64>,
 }
 
 impl Smoother {
@@ -48,6 +51,11 @@ impl Smoother {
             prior: smoother.choice("prior", Prior::Group),
             parametrisation: smoother.choice("parametrisation", Parametrisation::Exponential),
             jacobians: smoother.choice("jacobians", Jacobians::Frozen),
+            hand_over_deg: smoother.optional_float(
+                "hand_over_deg",
+                Some("deg"),
+                Interval::above(0.0, 180.0),
+            ),
         }
     }
 }

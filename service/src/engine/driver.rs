@@ -286,7 +286,9 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     ) -> Result<usize, &'static str> {
         match self.history.smoothed(&self.model, give) {
             None => Err("the estimator is no smoother: there is no window of smoothed states"),
-            Some(0) => Err("there is no state yet: the daemon is not initialised"),
+            Some(_) if self.history.newest().is_none() => {
+                Err("there is no state yet: the daemon is not initialised")
+            }
             Some(count) => Ok(count),
         }
     }

@@ -218,6 +218,8 @@ pub struct SmootherSettings {
     pub parametrisation: Parametrisation,
     /// The rest. Its gate is open: fixes are judged before they enter.
     pub window: WindowOptions,
+    /// The filter takes over once the standard deviation of the heading is below this, rad.
+    pub hand_over_sigma: Option<f64>,
 }
 
 /// Everything.
@@ -303,6 +305,7 @@ fn smoother(smoother: &config::Smoother) -> SmootherSettings {
             jacobians,
             ..WindowOptions::new(smoother.window)
         },
+        hand_over_sigma: smoother.hand_over_deg.map(f64::to_radians),
     }
 }
 

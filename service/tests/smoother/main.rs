@@ -11,6 +11,7 @@ mod allocation;
 mod counting;
 mod effort;
 mod golden;
+mod hand_over;
 mod late;
 mod lockout;
 mod window;

@@ -167,11 +167,6 @@ impl<G: InertialState<D>, const D: usize> Behind<G, D> {
         self.pace = Pace::default();
     }
 
-    /// Whether there is a state.
-    pub fn has_begun(&self) -> bool {
-        !self.stamps.is_empty()
-    }
-
     /// From when on samples are still needed, nanoseconds.
     pub fn needs_from_ns(&self) -> Option<u64> {
         let is_moving = matches!(self.phase, Phase::Solving | Phase::Following);

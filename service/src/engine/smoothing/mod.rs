@@ -13,11 +13,15 @@
 //! for [`settle`](History::settle), or for the next sample to be out.
 //!
 //! A lock-out ends with a new window: it begins with the widened estimate, for what the old one believed is doubted.
+//!
+//! After an alignment the smoother can hand over: from then on there is no window, and a fix corrects the estimate as
+//! the filter's update does.
 
 use inekf::filter::{Belief, Gate, Left, Transport, UpdateError, UpdateOptions, Verdict};
 use inekf::model::{ImuInput, InertialState};
 use inekf::smoother::WindowError;
 use inekf_shared::message::{NO_SOURCE, SmoothedState};
+use nalgebra::Vector3;
 
 use super::driver::Engine;
 use super::fix::Fix;
@@ -58,6 +62,20 @@ pub struct Smoothing<G, const D: usize> {
     /// Sorted by [`Fix::order`].
     waiting: Vec<Waiting>,
     lockout: Lockout,
+    has_started: bool,
+    /// Below this standard deviation of the heading, rad, the filter goes on alone.
+    hand_over_sigma: Option<f64>,
+    /// How a fix corrects the estimate then.
+    filtering: UpdateOptions,
+    /// Whether the filter goes on alone.
+    is_handed_over: bool,
+}
+
+/// Of the turn about the vertical, rad^2.
+fn heading_variance<G: InertialState<D>, const D: usize>(belief: &Belief<G, Left, D>) -> f64 {
+    let up_b = belief.mean.pose().rotation.inverse_rotate(&Vector3::z());
+    let attitude = belief.covariance.matrix().fixed_view::<3, 3>(0, 0);
+    up_b.dot(&(attitude * up_b))
 }
 
 /// What the counters know.
@@ -102,6 +120,10 @@ impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
             source: NO_SOURCE,
             waiting: Vec::with_capacity(MAX_FIXES),
             lockout: Lockout::new(fusion.recover_after),
+            has_started: false,
+            hand_over_sigma: smoother.hand_over_sigma,
+            filtering: fusion.update,
+            is_handed_over: false,
         }
     }
 
@@ -122,26 +144,36 @@ impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
         if self.behind.is_full() {
             self.catch_up(model);
         }
+        self.hand_over_if_due(model);
+        let options = if self.is_handed_over {
+            self.filtering
+        } else {
+            self.judging
+        };
         let mut stand = self.since.at(model, fix.stamp_ns);
         let mut belief = stand.belief;
-        let mut outcome = fix.measurement.fuse(&mut belief, &self.judging);
+        let mut outcome = fix.measurement.fuse(&mut belief, &options);
         if let Some(nis) = self.lockout.broken_by(fix, &outcome) {
             self.catch_up(model);
             let widening = model.widening(&stand.belief, fix, nis);
             let wide = fix.measurement.widened(&stand.belief, &widening);
-            self.behind.begin(fix.stamp_ns, &wide);
+            if !self.is_handed_over {
+                self.behind.begin(fix.stamp_ns, &wide);
+            }
             stand = Stand::new(fix.stamp_ns, &wide);
             belief = wide;
             let open = UpdateOptions {
                 gate: Gate::OPEN,
-                ..self.judging
+                ..options
             };
             outcome = fix.measurement.fuse(&mut belief, &open);
         }
         let fused = outcome?;
         if fused.verdict == Verdict::Accepted {
             self.source = fix.source;
-            if self.behind.is_ready_for(fix.stamp_ns, &seen) {
+            if self.is_handed_over {
+                // The belief is the filter's.
+            } else if self.behind.is_ready_for(fix.stamp_ns, &seen) {
                 belief = self.behind.lead(&stand, seen).map_err(update_error)?;
             } else {
                 self.behind.add(&stand, seen);
@@ -149,6 +181,19 @@ impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
             self.since.restart(model, fix.stamp_ns, &belief);
         }
         Ok(fused)
+    }
+
+    /// Ends the window once the heading is known well enough, if that is wanted; its states leave.
+    fn hand_over_if_due(&mut self, model: &Inertial<G, Left, D>) {
+        let Some(sigma) = self.hand_over_sigma else {
+            return;
+        };
+        if self.is_handed_over || heading_variance(&self.since.newest().belief) >= sigma * sigma {
+            return;
+        }
+        self.catch_up(model);
+        self.behind.give_up();
+        self.is_handed_over = true;
     }
 
     /// Judges the fixes that are due.
@@ -185,6 +230,7 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
         state: Belief<G, Left, D>,
     ) {
         self.clear(model);
+        self.has_started = true;
         self.behind.begin(stamp_ns, &state);
         self.since.start(stamp_ns, input, &state);
     }
@@ -193,6 +239,7 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
         // The states that leave are to have seen every fix.
         self.behind.catch_up(model, &self.since);
         self.behind.give_up();
+        (self.has_started, self.is_handed_over) = (false, false);
         self.waiting.clear();
         self.lockout.clear();
     }
@@ -203,13 +250,12 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
 
     fn newest(&self) -> Option<(u64, &Belief<G, Left, D>)> {
         let newest = self.since.newest();
-        self.behind
-            .has_begun()
+        self.has_started
             .then_some((newest.stamp_ns, &newest.belief))
     }
 
     fn awaits_input_at(&self, stamp_ns: u64) -> bool {
-        self.behind.has_begun() && self.since.awaits_input_at(stamp_ns)
+        self.has_started && self.since.awaits_input_at(stamp_ns)
     }
 
     fn set_input(&mut self, input: ImuInput) {
@@ -223,7 +269,7 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
         input: ImuInput,
         mut emit: impl FnMut(Event<'_, Belief<G, Left, D>, Aiding>),
     ) -> Result<(), Breakdown> {
-        if !self.behind.has_begun() {
+        if !self.has_started {
             return Err(Breakdown);
         }
         let (motion, state) = self.since.step(model, stamp_ns, &input);
@@ -239,7 +285,9 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
         }
         self.since.push(model, stamp_ns, input, &motion, &state);
         self.judge_due(model, &mut emit);
-        if let Some(ready) = self.behind.keep_up(model, &self.since) {
+        if !self.is_handed_over
+            && let Some(ready) = self.behind.keep_up(model, &self.since)
+        {
             self.since.take_over(&ready);
             emit(Event::Smoothed {
                 stamp_ns,
@@ -260,7 +308,7 @@ impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoo
         let now_ns = self.since.newest().stamp_ns;
         let is_too_late = now_ns.saturating_sub(fix.stamp_ns) > self.late_window_ns
             || fix.stamp_ns < self.since.oldest_ns();
-        if !self.behind.has_begun() || is_too_late {
+        if !self.has_started || is_too_late {
             return Insertion::TooLate;
         }
         if self.waiting.len() >= MAX_FIXES {

@@ -169,6 +169,17 @@ pub fn store(path: &Path, bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
+/// Removes the file at `path`, if it is there.
+///
+/// # Errors
+/// As the system says.
+pub fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
 /// Where the file is written before it is renamed.
 fn beside(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();

@@ -2,7 +2,8 @@
 //!
 //! The estimation thread only copies the state into a slot ([`handover`]); a thread of its own encodes it and writes the
 //! file ([`mod@file`]). However slow the disk is and whatever it refuses, the estimate goes on: a failure is counted, and
-//! said in the log once until it works again. What the next start does with the state is
+//! said in the log once until it works again. A state that was forgotten, by a reset or a jump of the clock, is
+//! forgotten on the disk too. What the next start does with the state is
 //! [`crate::engine::resume`]'s.
 
 pub mod file;
@@ -16,7 +17,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::thread;
 
 use anyhow::Context;
-use inekf_shared::message::{StateVector, Zero};
+use inekf_shared::message::StateVector;
 use tracing::{info, warn};
 
 use file::Identity;
@@ -39,12 +40,14 @@ struct Counts {
 /// Keeps the checkpoint of a running daemon. It belongs to the estimation thread.
 #[derive(Debug)]
 pub struct Keeper {
-    giver: Giver<StateVector>,
-    given: StateVector,
+    giver: Giver<Option<StateVector>>,
+    /// What was given last; none before there was a state, and after it was forgotten.
+    given: Option<StateVector>,
     period_ns: u64,
     next_ns: u64,
     counts: Arc<Counts>,
-    last: Sender<Option<StateVector>>,
+    /// Dropped to end the thread.
+    running: Sender<()>,
     ended: Receiver<()>,
 }
 
@@ -59,9 +62,9 @@ impl Keeper {
         period_ns: u64,
         now_ns: u64,
     ) -> anyhow::Result<Self> {
-        let (giver, taker) = handover::pair(StateVector::ZERO);
-        let (last, when_last) = mpsc::channel();
-        let (end, ended) = mpsc::channel();
+        let (giver, taker) = handover::pair(None);
+        let (running, end) = mpsc::channel();
+        let (done, ended) = mpsc::channel();
         let counts = Arc::new(Counts::default());
         let mut writer = Writer {
             path,
@@ -73,30 +76,31 @@ impl Keeper {
         thread::Builder::new()
             .name("checkpoint".to_owned())
             .spawn(move || {
-                writer.run(taker, &when_last, look);
+                writer.run(taker, &end, look);
                 // Nobody may wait for it any more.
-                let _ = end.send(());
+                let _ = done.send(());
             })
             .context("starting the thread that writes the checkpoint")?;
         Ok(Self {
             giver,
-            given: StateVector::ZERO,
+            given: None,
             period_ns,
             next_ns: now_ns,
             counts,
-            last,
+            running,
             ended,
         })
     }
 
     /// Takes the state for a checkpoint, if one is due at `now_ns` (CLOCK_MONOTONIC) and `state` has another than the
-    /// last. Neither waits nor allocates.
+    /// last; none, where there was one, removes the file. Neither waits nor allocates.
     pub fn keep(&mut self, now_ns: u64, state: impl FnOnce() -> Option<StateVector>) {
         if now_ns < self.next_ns {
             return;
         }
         self.next_ns = now_ns.saturating_add(self.period_ns);
-        if let Some(state) = state().filter(|state| *state != self.given) {
+        let state = state();
+        if state != self.given {
             self.given = state;
             self.giver.give(&state);
         }
@@ -108,9 +112,13 @@ impl Keeper {
         (of(&self.counts.written), of(&self.counts.failed))
     }
 
-    /// Writes the last checkpoint, and waits for it, but not for long. Without a state the file stays as it is.
-    pub fn finish(self, state: Option<StateVector>) {
-        let _ = self.last.send(state);
+    /// Writes the last checkpoint, and waits for it, but not for long. If there has never been a state, the file stays
+    /// as it is.
+    pub fn finish(mut self, state: Option<StateVector>) {
+        if state != self.given {
+            self.giver.give(&state);
+        }
+        drop(self.running);
         if let Err(RecvTimeoutError::Timeout) = self.ended.recv_timeout(LAST_WITHIN) {
             warn!("the disk is slow: the last checkpoint is given up");
         }
@@ -127,26 +135,26 @@ struct Writer {
 }
 
 impl Writer {
-    fn run(
-        &mut self,
-        mut taker: Taker<StateVector>,
-        last: &Receiver<Option<StateVector>>,
-        look: Duration,
-    ) {
+    fn run(&mut self, mut taker: Taker<Option<StateVector>>, end: &Receiver<()>, look: Duration) {
         loop {
-            match last.recv_timeout(look) {
-                Err(RecvTimeoutError::Timeout) => {
-                    if let Some(state) = taker.take() {
-                        self.write(&state);
-                    }
+            let ends = end.recv_timeout(look) == Err(RecvTimeoutError::Disconnected);
+            if let Some(state) = taker.take() {
+                self.keep(state.as_ref());
+            }
+            if ends {
+                return;
+            }
+        }
+    }
+
+    /// Writes the state, or removes the file where there is none any more.
+    fn keep(&mut self, state: Option<&StateVector>) {
+        match state {
+            Some(state) => self.write(state),
+            None => {
+                if let Err(error) = file::remove(&self.path) {
+                    warn!(path = %self.path.display(), "the checkpoint of a forgotten state stays: {error}");
                 }
-                Ok(state) => {
-                    if let Some(state) = state {
-                        self.write(&state);
-                    }
-                    return;
-                }
-                Err(RecvTimeoutError::Disconnected) => return,
             }
         }
     }
@@ -198,7 +206,7 @@ mod tests {
     use std::fs;
     use std::time::Instant;
 
-    use inekf_shared::message::MODEL_IMU;
+    use inekf_shared::message::{MODEL_IMU, Zero};
 
     use super::*;
 
@@ -249,6 +257,18 @@ mod tests {
         let keeper = Keeper::start(path.clone(), identity(), 1000, 5).unwrap();
         keeper.finish(None);
         assert_eq!(last_state(&path, &identity()), Ok(Some(state(9))));
+        // A state that was forgotten.
+        let mut keeper = Keeper::start(path.clone(), identity(), 1000, 5).unwrap();
+        keeper.keep(5, || None);
+        keeper.keep(1005, || Some(state(10)));
+        eventually("written", || keeper.counts() == (1, 0));
+        keeper.keep(2005, || None);
+        eventually("removed", || !path.exists());
+        keeper.keep(3005, || Some(state(11)));
+        eventually("written", || keeper.counts() == (2, 0));
+        keeper.finish(None);
+        assert_eq!(last_state(&path, &identity()), Ok(None));
+
         fs::write(&path, b"torn").unwrap();
         assert_eq!(last_state(&path, &identity()), Err(Unused));
     }
@@ -265,7 +285,7 @@ mod tests {
         fs::create_dir(&home).unwrap();
         keeper.keep(100, || Some(state(4)));
         eventually("written", || keeper.counts() == (1, 3));
-        keeper.finish(None);
+        keeper.finish(Some(state(4)));
         assert_eq!(
             last_state(&home.join("kept"), &identity()),
             Ok(Some(state(4)))

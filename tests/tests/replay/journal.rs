@@ -438,6 +438,37 @@ fn a_daemon_that_was_resumed_comes_again_from_the_state_it_was_resumed_with() {
 }
 
 #[test]
+fn the_recording_of_a_daemon_that_is_killed_ends_with_the_next_and_comes_again() {
+    let Recorded {
+        memory,
+        folder,
+        recorder,
+        daemon,
+    } = Recorded::start(CONFIG);
+    let rows: Vec<Event> = drive(34, 3.0).events().collect();
+    let mut link = Link::open(&memory, "car");
+    let estimates = link.feed(rows.iter().copied());
+    drop(link);
+    assert!(!daemon.stop_with(Signal::KILL).status.success());
+    let daemon = Daemon::start(&memory, "car", &format!("{CONFIG}\n{JOURNAL}"));
+    let mut link = Link::open(&memory, "car");
+    link.feed(rows.iter().copied());
+    let ended = recorder.wait().succeeded();
+    assert!(
+        ended.stdout.contains("the daemon was started anew"),
+        "{ended:?}"
+    );
+    drop(link);
+    daemon.stop();
+    memory.assert_nothing_left();
+    let recording = Recording {
+        path: folder.path().join("car.rec"),
+        _folder: folder,
+    };
+    assert_eq!(recording.assert_equal("killed"), estimates.len() as u64);
+}
+
+#[test]
 fn a_recorder_that_cannot_record_says_why() {
     let (memory, folder) = (Memory::new(), TempDir::new().expect("a folder"));
     let daemon = Daemon::start(&memory, "car", CONFIG);

@@ -114,8 +114,10 @@ fn abandoned_services(config: &Config) -> Result<Vec<PathBuf>, TransportError> {
         )?;
         used.extend(tags.into_iter().map(|tag| tag.stem));
     }
-    let abandoned =
-        |service: &Entry| !used.contains(&service.stem) || hangs_half_made(config, service);
+    let abandoned = |service: &Entry| {
+        is_hash(&service.stem)
+            && (!used.contains(&service.stem) || hangs_half_made(config, service))
+    };
     Ok(services
         .into_iter()
         .filter(abandoned)
@@ -199,10 +201,22 @@ fn abandoned_nodes(config: &Config) -> Result<Vec<PathBuf>, TransportError> {
         .collect())
 }
 
-/// Whether everything in a node's folder bears the prefix. An empty one is anybody's.
+/// Whether everything in a node's folder is named as under this prefix; another may only begin like it. An empty one is
+/// anybody's.
 fn own_folder(folder: &Path, prefix: &str) -> Result<bool, TransportError> {
+    let is_own = |name: &str| {
+        name.strip_prefix(prefix).is_some_and(|rest| {
+            let stem = rest.split('.').next().unwrap_or_default();
+            stem == "node" || is_hash(stem) || stem.parse::<u128>().is_ok()
+        })
+    };
     let files = entries(folder)?;
-    Ok(files.iter().all(|(name, _, _)| name.starts_with(prefix)))
+    Ok(files.iter().all(|(name, _, _)| is_own(name)))
+}
+
+/// Whether it is the hash of a service's name.
+fn is_hash(stem: &str) -> bool {
+    stem.len() == HASH_LEN && stem.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
 /// Segments, connections and sockets whose makers have no living node, and that no service refers to.

@@ -188,7 +188,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         self.anisotropic = 0;
         self.solve = None;
         self.ahead = None;
-        self.cover = Cover::default();
+        self.cover.forget();
         self.gone = false;
         self.gains_hold = self.is_constant();
     }
@@ -230,7 +230,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         });
         self.knots.push_back(knot);
         self.passages.push_back(passage);
-        self.cover = Cover::default();
+        self.cover.forget();
         left.flatten()
     }
 

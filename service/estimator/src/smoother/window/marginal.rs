@@ -38,6 +38,13 @@ impl<const D: usize> Default for Cover<D> {
     }
 }
 
+impl<const D: usize> Cover<D> {
+    /// The window is another one.
+    pub fn forget(&mut self) {
+        (self.end, self.covariance) = (None, None);
+    }
+}
+
 impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     /// Goes on with the covariance of the oldest state, for it to be known when that leaves, while `budget` units of work
     /// are left, and takes what it did from them. Whether it is known.
@@ -47,7 +54,10 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         }
         let mut index = match self.cover.end {
             Some(end) => end - 1,
-            None => self.knots.len() - 1,
+            None => {
+                self.cover.information = SMatrix::zeros();
+                self.knots.len() - 1
+            }
         };
         let cost = self.work_of_cover();
         while index > 0 {

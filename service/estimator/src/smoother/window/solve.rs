@@ -11,7 +11,6 @@
 use nalgebra::SVector;
 
 use super::knot::{Knot, Passage};
-use super::marginal::Cover;
 use super::{Fix, Window, WindowCorrection, WindowError};
 use crate::filter::{Side, Verdict};
 use crate::model::InertialState;
@@ -84,7 +83,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         if self.knots[last].fix.is_some() {
             return Err(WindowError::AlreadySeen);
         }
-        self.cover = Cover::default();
+        self.cover.forget();
         self.knots[last].fix = Some(fix);
         self.anisotropic += usize::from(!fix.is_isotropic());
         let fresh = self.must_linearise();

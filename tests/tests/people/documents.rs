@@ -9,11 +9,15 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread;
+use std::time::{Duration, Instant};
 
 use inekf_tests::folder::Folder;
 use inekf_tests::memory::Memory;
 use inekf_tests::process::Running;
 use inekf_tests::programs::{example, programs};
+
+/// Longest time for all commands of a page: some run in real time, and all pages run at once.
+const PAGE_PATIENCE: Duration = Duration::from_secs(300);
 
 /// Whatever a page has left running ends with it, should one of its commands fail.
 const STOP_ALL: &str = "trap 'kill $(jobs -p) 2>/dev/null || true' EXIT\n";
@@ -87,7 +91,14 @@ fn every_command_of_the_documentation_runs() {
                     .current_dir(folder.path())
                     .env("PATH", path)
                     .env("CONFIG", config);
-                let ended = Running::start(command).wait();
+                let mut running = Running::start(command);
+                let started = Instant::now();
+                while running.is_running() {
+                    let late = started.elapsed() > PAGE_PATIENCE;
+                    assert!(!late, "{}: {running:?} does not end", page.display());
+                    thread::sleep(Duration::from_millis(20));
+                }
+                let ended = running.wait();
                 assert!(ended.status.success(), "{}: {ended:#?}", page.display());
             });
         }

@@ -8,9 +8,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use inekf_client::dataset::ImuRow;
 use inekf_client::feed::Feeder;
 use inekf_client::layout;
-use inekf_tests::drive;
 use inekf_tests::folder::Folder;
 use inekf_tests::link::{Link, instance};
 use inekf_tests::memory::Memory;
@@ -19,6 +19,16 @@ use inekf_tests::programs::{c_library, example};
 use inekf_tests::tools;
 
 const CONFIG: &str = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+
+/// A position to start from: no fix is needed.
+const PLACED: &str = "\
+model = 'imu'
+[noise]
+gyro_density = 3e-4
+accel_density = 2e-2
+[initial]
+position_m = [0.0, 0.0, 0.0]
+";
 
 fn examples() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../client/examples")
@@ -117,15 +127,18 @@ fn c_and_cpp_lay_the_messages_out_as_the_daemon_does_and_notice_if_not() {
     }
 }
 
-/// Feeds a daemon until a program has ended.
+/// Feeds a daemon with an IMU at rest until a program has ended, however long that takes to start.
 fn feed_until_ended(memory: &Memory, mut running: Running) -> Ended {
     let mut feeder = Feeder::open_on(memory.node(), &instance("car")).expect("a feeder");
-    let drive = drive::drive(1, 20.0);
-    let mut events = drive.events();
+    let mut stamp_ns = 0;
     eventually("the end of the example", || {
-        for event in events.by_ref().take(5) {
-            feeder.send(&event).expect("it can be sent");
-        }
+        stamp_ns += 10_000_000;
+        let row = ImuRow {
+            stamp_ns,
+            gyro_rps: [0.0; 3],
+            accel_mps2: [0.0, 0.0, 9.80665],
+        };
+        feeder.imu(&row).expect("it can be sent");
         (!running.is_running()).then_some(())
     });
     running.wait().succeeded()
@@ -166,7 +179,7 @@ fn the_python_reader_reads_a_running_daemon() {
         return;
     };
     let memory = Memory::new();
-    let daemon = Daemon::start(&memory, "car", drive::CONFIG);
+    let daemon = Daemon::start(&memory, "car", PLACED);
     let arguments = ["-B", "reader.py", "car", "5"];
     let reader = run(&memory, &python, &arguments, &examples().join("python"));
     assert_reads(&feed_until_ended(&memory, reader));
@@ -261,7 +274,7 @@ fn the_cpp_reader_reads_a_running_daemon() {
     Running::start(compile).wait().succeeded();
 
     let memory = Memory::new();
-    let daemon = Daemon::start(&memory, "car", drive::CONFIG);
+    let daemon = Daemon::start(&memory, "car", PLACED);
     let program = build.join("reader").into_os_string();
     let reader = run(&memory, &program, &["car", "5"], &build);
     assert_reads(&feed_until_ended(&memory, reader));

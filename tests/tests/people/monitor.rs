@@ -1,10 +1,13 @@
 //! The live view of a real daemon, a line a second.
 
+use std::time::{Duration, Instant};
+
+use inekf_client::dataset::Event;
 use inekf_client::feed::Feeder;
 use inekf_tests::drive;
 use inekf_tests::link::instance;
 use inekf_tests::memory::Memory;
-use inekf_tests::process::{Daemon, eventually, start_client};
+use inekf_tests::process::{Daemon, PATIENCE, eventually, start_client};
 
 #[test]
 fn the_monitor_says_what_a_daemon_is_at() {
@@ -15,10 +18,13 @@ fn the_monitor_says_what_a_daemon_is_at() {
         monitor.stdout().contains("waiting for imu").then_some(())
     });
     let mut feeder = Feeder::open_on(memory.node(), &instance("car")).expect("a feeder");
-    let dataset = drive::drive(1, 30.0);
-    let mut events = dataset.events();
+    // In real time, for as long as anybody waits.
+    let dataset = drive::drive(1, PATIENCE.as_secs_f64());
+    let mut events = dataset.events().peekable();
+    let started = Instant::now();
     let line = eventually("a line about a daemon that estimates", || {
-        for event in events.by_ref().take(4) {
+        let due = |event: &Event| Duration::from_nanos(event.stamp_ns()) <= started.elapsed();
+        while let Some(event) = events.next_if(due) {
             feeder.send(&event).expect("it can be sent");
         }
         assert!(monitor.is_running(), "{}", monitor.stderr());

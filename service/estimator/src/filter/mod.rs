@@ -61,5 +61,6 @@ pub use linearised::Linearised;
 pub use propagate::{
     propagate, propagate_augmented, propagate_dense, propagate_in_place, propagate_odometry,
 };
+pub(crate) use seen::Seen;
 pub use side::{InertialSide, Left, Right, Side};
 pub use update::{Correction, Transport, UpdateError, UpdateOptions, Verdict, update, update_with};

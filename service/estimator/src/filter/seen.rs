@@ -4,7 +4,7 @@ use nalgebra::SMatrix;
 
 /// The states seen, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Seen<const D: usize> {
+pub(crate) struct Seen<const D: usize> {
     states: [usize; D],
     count: usize,
 }

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::Fix;
 use super::fix::HeadingRow;
 use super::track::{InputJacobian, Track};
-use crate::filter::{Covariance, Side};
+use crate::filter::{Covariance, Seen, Side};
 use crate::model::InertialState;
 use crate::smoother::linearise;
 use crate::smoother::{Jacobians, Link, Preintegration};
@@ -144,7 +144,9 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
             return false;
         };
         let gain = p_ht * weight;
-        self.filtered = self.filtered.corrected_with(&p_ht, &gain, &h, &noise);
+        self.filtered = self
+            .filtered
+            .corrected_with(&p_ht, &gain, &Seen::by(&h), &h, &noise);
         self.gain = Some(FixGain { gain, weight, row });
         true
     }

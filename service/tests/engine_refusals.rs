@@ -3,8 +3,8 @@
 mod common;
 
 use common::{
-    EPOCH, Engine, Input, all_bits, assert_refused, circle, feed, heading, imu, isotropic, position, run,
-    settings, stamp, velocity,
+    EPOCH, Engine, Input, all_bits, assert_refused, circle, feed, heading, imu, isotropic,
+    position, run, settings, stamp, velocity,
 };
 use inekf_service::engine::tally::Refusal;
 use inekf_shared::message::{

@@ -13,8 +13,8 @@ use super::{Outcome, Plan};
 use crate::process::{Ended, Running, config_file, eventually};
 use crate::programs::programs;
 
-/// Runs in a mount namespace of its own with `$1` of space in `/dev/shm`: starts a daemon, feeds it for a moment, stops
-/// it, and ends as the daemon ended.
+/// Runs in a mount namespace of its own with `$1` of space in `/dev/shm`: starts a daemon, feeds it for a moment and
+/// stops it. Ends as the daemon ended at its start, with 91 if only the feeder failed.
 const SMALL: &str = r#"
 mount -t tmpfs -o size="$1" tmpfs /dev/shm || exit 90
 "$SERVICE" --config "$CONFIG" --instance car & daemon=$!
@@ -25,8 +25,12 @@ for i in $(seq 100); do
 done
 sleep 0.1
 if kill -0 $daemon 2>/dev/null; then
-    timeout 5 "$PARTY" feed --instance car --rate 1000 --count 2000 || exit 91
+    timeout 20 "$PARTY" feed --instance car --rate 1000 --count 1000
+    fed=$?
     kill -TERM $daemon
+    wait $daemon || exit 92
+    [ $fed = 0 ] || exit 91
+    exit 0
 fi
 wait $daemon
 "#;
@@ -79,7 +83,7 @@ pub fn shared_memory_full(plan: &Plan) -> Outcome {
     }
     let mut moments = plan.moments("shm");
     let rounds = plan.at_most(60);
-    let (mut refused, mut started, mut after) = (0, 0, 0);
+    let (mut refused, mut unfed, mut started, mut after) = (0, 0, 0, 0);
     for round in 0..rounds {
         // From 4 KiB to 32 MiB, evenly in the logarithm.
         let kib = (4.0 * 2_f64.powf(13.0 * f64::from(round) / f64::from(rounds.max(2) - 1))) as u64;
@@ -95,6 +99,11 @@ pub fn shared_memory_full(plan: &Plan) -> Outcome {
                 assert!(line.contains("/dev/shm is too full"), "{kib} KiB: {line}");
                 refused += 1;
             }
+            Some(91) => {
+                let said = |line: &str| line.contains("/dev/shm is too full");
+                assert!(ended.stderr.lines().any(said), "{kib} KiB: {ended:#?}");
+                unfed += 1;
+            }
             _ => panic!("{kib} KiB: {ended:#?}"),
         }
         after = after.max(scene.files_after_doctor());
@@ -106,7 +115,8 @@ pub fn shared_memory_full(plan: &Plan) -> Outcome {
         survivors: "-",
         files: Some((0, after)),
         note: format!(
-            "4 KiB to 32 MiB: {refused} refused at start in one line, {started} ran; no SIGBUS"
+            "4 KiB to 32 MiB: {refused} refused at start in one line, {unfed} had no room for a feeder, which said so, \
+             {started} ran; no SIGBUS"
         ),
         ..Outcome::default()
     }

@@ -24,6 +24,17 @@ struct Knot<I, X> {
     state: X,
 }
 
+/// What lies between two knots.
+#[derive(Clone, Copy, Debug)]
+struct Interval<I> {
+    from_ns: u64,
+    /// The sample at its beginning, if there is one.
+    before: Option<I>,
+    stamp_ns: u64,
+    /// The sample at its end.
+    input: I,
+}
+
 /// A fix on the timeline; once decided, a replay repeats how it was let in.
 #[derive(Clone, Copy, Debug)]
 struct Entry<Z> {
@@ -53,17 +64,22 @@ impl<M: Model> Timeline<M> {
         }
     }
 
-    /// Propagates from a knot to the sample at `stamp_ns`, stopping at each fix on the way (and,
+    /// Propagates `state` over an interval to its sample, stopping at each fix on the way (and,
     /// after the sample, at those of its very stamp) to hand the state to `pass`.
     fn run_interval(
         &mut self,
         model: &M,
-        from: &Knot<M::Input, M::State>,
-        stamp_ns: u64,
-        input: M::Input,
+        interval: &Interval<M::Input>,
+        state: &mut M::State,
         pass: &mut impl FnMut(&mut Self, usize, Passed<'_, M::State>),
-    ) -> Knot<M::Input, M::State> {
-        let motion = model.motion(from.input.as_ref(), &input, stamp_ns - from.stamp_ns);
+    ) {
+        let Interval {
+            from_ns,
+            before,
+            stamp_ns,
+            input,
+        } = *interval;
+        let motion = model.motion(before.as_ref(), &input, stamp_ns - from_ns);
         let move_to = |state: &mut M::State, now_ns: &mut u64, to_ns: u64| {
             if to_ns > *now_ns {
                 model.advance(state, &motion, to_ns - *now_ns);
@@ -71,34 +87,28 @@ impl<M: Model> Timeline<M> {
             }
         };
 
-        let mut state = from.state;
-        let mut now_ns = from.stamp_ns;
+        let mut now_ns = from_ns;
         let mut index = self
             .entries
-            .partition_point(|entry| entry.fix.stamp_ns <= from.stamp_ns);
+            .partition_point(|entry| entry.fix.stamp_ns <= from_ns);
         while let Some(entry) = self.entries.get(index) {
             let fix_ns = entry.fix.stamp_ns;
             if fix_ns >= stamp_ns {
                 break;
             }
-            move_to(&mut state, &mut now_ns, fix_ns);
-            pass(self, index, Passed::Fix(&mut state));
+            move_to(state, &mut now_ns, fix_ns);
+            pass(self, index, Passed::Fix(state));
             index += 1;
         }
-        move_to(&mut state, &mut now_ns, stamp_ns);
-        pass(self, index, Passed::Sample(&state));
+        move_to(state, &mut now_ns, stamp_ns);
+        pass(self, index, Passed::Sample(state));
         while self
             .entries
             .get(index)
             .is_some_and(|entry| entry.fix.stamp_ns == stamp_ns)
         {
-            pass(self, index, Passed::Fix(&mut state));
+            pass(self, index, Passed::Fix(state));
             index += 1;
-        }
-        Knot {
-            stamp_ns,
-            input: Some(input),
-            state,
         }
     }
 
@@ -129,14 +139,14 @@ impl<M: Model> Timeline<M> {
 
     /// Appends a knot, forgetting what has left the window.
     fn push(&mut self, knot: Knot<M::Input, M::State>) {
+        let stamp_ns = knot.stamp_ns;
         let capacity = self.fusion.late_capacity.max(2);
         while self.knots.len() >= capacity {
             self.knots.pop_front();
         }
         self.knots.push_back(knot);
         // Two knots always stay: the newest, and the one before it for fixes of its stamp.
-        while self.knots.len() > 2
-            && knot.stamp_ns - self.knots[1].stamp_ns > self.fusion.late_window_ns
+        while self.knots.len() > 2 && stamp_ns - self.knots[1].stamp_ns > self.fusion.late_window_ns
         {
             self.knots.pop_front();
         }
@@ -211,15 +221,21 @@ impl<M: Model> History<M> for Timeline<M> {
         input: M::Input,
         mut emit: impl FnMut(Event<'_, M::State, M::Measurement>),
     ) -> Result<(), Breakdown> {
-        let Some(&from) = self.knots.back() else {
+        let Some(from) = self.knots.back() else {
             return Err(Breakdown);
         };
-        let mut sound = true;
-        let to = self.run_interval(
-            model,
-            &from,
+        let interval = Interval {
+            from_ns: from.stamp_ns,
+            before: from.input,
             stamp_ns,
             input,
+        };
+        let mut state = from.state;
+        let mut sound = true;
+        self.run_interval(
+            model,
+            &interval,
+            &mut state,
             &mut |timeline, index, event| match event {
                 Passed::Sample(state) => {
                     sound &= model.is_sound(state);
@@ -239,7 +255,11 @@ impl<M: Model> History<M> for Timeline<M> {
                 }
             },
         );
-        self.push(to);
+        self.push(Knot {
+            stamp_ns,
+            input: Some(input),
+            state,
+        });
         if sound { Ok(()) } else { Err(Breakdown) }
     }
 
@@ -289,22 +309,24 @@ impl<M: Model> History<M> for Timeline<M> {
             self.knots[back_to].state = state;
         }
         for later in back_to + 1..self.knots.len() {
-            let (from, to) = (self.knots[later - 1], self.knots[later]);
+            let (from, to) = (&self.knots[later - 1], &self.knots[later]);
             let Some(input) = to.input else { continue };
-            self.knots[later] = self.run_interval(
-                model,
-                &from,
-                to.stamp_ns,
+            let interval = Interval {
+                from_ns: from.stamp_ns,
+                before: from.input,
+                stamp_ns: to.stamp_ns,
                 input,
-                &mut |timeline, at, event| {
-                    if let Passed::Fix(state) = event {
-                        let judged = timeline.judge(model, at, state, at == index);
-                        if at == index {
-                            outcome = judged;
-                        }
+            };
+            let mut state = from.state;
+            self.run_interval(model, &interval, &mut state, &mut |timeline, at, event| {
+                if let Passed::Fix(state) = event {
+                    let judged = timeline.judge(model, at, state, at == index);
+                    if at == index {
+                        outcome = judged;
                     }
-                },
-            );
+                }
+            });
+            self.knots[later].state = state;
         }
         if let Some(newest) = self.knots.back() {
             emit(Event::Judged {

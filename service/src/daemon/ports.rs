@@ -160,6 +160,17 @@ impl<M: Model> Ports<M> {
         wait: WaitMode,
         smooths: bool,
     ) -> Result<Self, TransportError> {
+        let mut ports = Self::open_all(instance, wait, smooths)?;
+        // Once nothing is open any more that is closed again.
+        ports.guard = Guard::of(Watched::of(&ports.node)?);
+        Ok(ports)
+    }
+
+    fn open_all(
+        instance: &Instance,
+        wait: WaitMode,
+        smooths: bool,
+    ) -> Result<Self, TransportError> {
         let node = transport::open_node("inekf-service")?;
         // First of all: there is one server per instance, so a second daemon stops here.
         let control = transport::control(&node, instance)?.server()?;
@@ -178,7 +189,7 @@ impl<M: Model> Ports<M> {
             odometry2d: foreign::<M, _>(&inputs.odometry2d, INPUT_ODOMETRY_2D)?,
             odometry3d: foreign::<M, _>(&inputs.odometry3d, INPUT_ODOMETRY_3D)?,
         };
-        let mut ports = Self {
+        let ports = Self {
             inputs: Inputs {
                 samples: transport::input::<M::Sample>(&node, instance)?.subscriber()?,
                 position: FixPort::new(inputs.position.subscriber()?),
@@ -196,7 +207,6 @@ impl<M: Model> Ports<M> {
         };
         // Better an error now than a SIGBUS at some later send.
         transport::reserve_shared_memory(&ports.node)?;
-        ports.guard = Guard::of(Watched::of(&ports.node)?);
         Ok(ports)
     }
 

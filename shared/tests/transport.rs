@@ -475,7 +475,8 @@ fn reserved_memory_is_backed_before_it_is_written() {
     // Eight readers that each may keep a full buffer make the largest file.
     let largest = *sizes().last().unwrap();
     assert!(largest.0 > 8 * 1024 * 1288);
-    assert!(largest.1 < largest.0);
+    // Its publisher has backed it as a whole; the others are still to be backed.
+    assert!(largest.1 >= largest.0);
     let total = transport::reserve_shared_memory(&node).unwrap();
     assert!(sizes().iter().all(|(len, backed)| backed >= len));
     assert_eq!(total, sizes().iter().map(|(len, _)| len).sum::<u64>());

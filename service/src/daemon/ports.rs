@@ -188,7 +188,7 @@ impl<M: Model> Ports<M> {
         Ok(ports)
     }
 
-    /// Has an eye on the files from now on, if this is the only vehicle of its process: those of several cannot be told
+    /// Has an eye on the files from now on: call it once nothing is open any more that is closed again, and if this is the only vehicle of its process: those of several cannot be told
     /// apart.
     ///
     /// # Errors

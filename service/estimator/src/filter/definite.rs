@@ -4,7 +4,7 @@
 //! the others: after some thousand updates rounding errors are larger than what is left of the variance there, and an
 //! eigenvalue turns negative. Symmetric arithmetic does not prevent that. The remedy is a floor: with P scaled to unit
 //! variances, a Cholesky factorisation whose pivots (the variance of a component given those before it, as a share of
-//! its own) are lifted to [`LEAST_SHARE`], which adds to the variances and to nothing else.
+//! its own) are lifted to `LEAST_SHARE`, which adds to the variances and to nothing else.
 
 use super::covariance::Covariance;
 

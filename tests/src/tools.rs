@@ -7,6 +7,10 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::process::{Ended, Running};
 
 /// Environment variable: the Python.
 pub const PYTHON: &str = "INEKF_PYTHON";
@@ -47,6 +51,23 @@ pub fn cxx_bindings() -> Option<PathBuf> {
         println!("skipped: {CXX_BINDINGS} does not name where iceoryx2's C++ bindings are");
     }
     named
+}
+
+/// Longest time for a tool: they are large, and the machine may be busy.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// Waits for the end of a tool, longer than for a program of the project.
+///
+/// # Panics
+/// If it takes longer than five minutes.
+pub fn finish(mut running: Running) -> Ended {
+    let started = Instant::now();
+    while running.is_running() {
+        let late = started.elapsed() > PATIENCE;
+        assert!(!late, "it does not end: {running:?}, {}", running.stderr());
+        sleep(Duration::from_millis(20));
+    }
+    running.wait()
 }
 
 /// Whether it can be started and succeeds.

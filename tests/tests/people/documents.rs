@@ -9,15 +9,12 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::thread;
-use std::time::{Duration, Instant};
 
 use inekf_tests::folder::Folder;
 use inekf_tests::memory::Memory;
 use inekf_tests::process::Running;
 use inekf_tests::programs::{example, programs};
-
-/// Longest time for all commands of a page: some run in real time, and all pages run at once.
-const PAGE_PATIENCE: Duration = Duration::from_secs(300);
+use inekf_tests::tools;
 
 /// Whatever a page has left running ends with it, should one of its commands fail.
 const STOP_ALL: &str = "trap 'kill $(jobs -p) 2>/dev/null || true' EXIT\n";
@@ -91,14 +88,7 @@ fn every_command_of_the_documentation_runs() {
                     .current_dir(folder.path())
                     .env("PATH", path)
                     .env("CONFIG", config);
-                let mut running = Running::start(command);
-                let started = Instant::now();
-                while running.is_running() {
-                    let late = started.elapsed() > PAGE_PATIENCE;
-                    assert!(!late, "{}: {running:?} does not end", page.display());
-                    thread::sleep(Duration::from_millis(20));
-                }
-                let ended = running.wait();
+                let ended = tools::finish(Running::start(command));
                 assert!(ended.status.success(), "{}: {ended:#?}", page.display());
             });
         }

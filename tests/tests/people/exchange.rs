@@ -69,7 +69,7 @@ fn evo_accepts_the_export_and_finds_the_error_that_the_report_finds() {
         .args(["tum", "truth.tum", "estimate.tum"])
         .current_dir(folder.path())
         .env("HOME", folder.path());
-    let ended = Running::start(command).wait().succeeded();
+    let ended = tools::finish(Running::start(command)).succeeded();
     let rmse: f64 = ended
         .stdout
         .lines()
@@ -143,7 +143,7 @@ fn the_public_reader_decodes_the_mcap_and_finds_the_estimates_in_it() {
     };
     let mut command = Command::new(python);
     command.args(["-c", DECODE]).current_dir(folder.path());
-    let ended = Running::start(command).wait().succeeded();
+    let ended = tools::finish(Running::start(command)).succeeded();
     let rows = estimates(&folder.path().join("estimate.csv")).len();
     assert_eq!(ended.stdout.trim(), format!("good {rows}"));
 }

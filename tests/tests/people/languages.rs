@@ -232,7 +232,7 @@ fn the_c_interface_feeds_and_reads_from_c_and_from_cpp() {
             .arg(&library)
             .arg("-o")
             .arg(&program);
-        Running::start(command).wait().succeeded();
+        tools::finish(Running::start(command)).succeeded();
         let start = |instance: &str| {
             let mut command = memory.command(&program);
             let beside = library.parent().expect("the library's folder");
@@ -268,10 +268,10 @@ fn the_cpp_reader_reads_a_running_daemon() {
         .arg("-B")
         .arg(&build)
         .arg(format!("-DCMAKE_PREFIX_PATH={}", bindings.display()));
-    Running::start(configure).wait().succeeded();
+    tools::finish(Running::start(configure)).succeeded();
     let mut compile = Command::new(cmake);
     compile.arg("--build").arg(&build);
-    Running::start(compile).wait().succeeded();
+    tools::finish(Running::start(compile)).succeeded();
 
     let memory = Memory::new();
     let daemon = Daemon::start(&memory, "car", PLACED);

@@ -117,7 +117,7 @@ fn every_code_has_a_name_of_its_own_and_an_undefined_one_is_unknown() {
         (state_name, &[1, 2, 3, 4, 5, 6]),
         (waiting_for_name, &[0, 1, 2, 3, 4]),
         (reason_name, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]),
-        (estimate_flag_name, &[1, 2, 4, 8, 16, 32]),
+        (estimate_flag_name, &[1, 2, 4, 8, 16, 32, 64]),
         (model_name, &[1, 2, 3]),
         (control_kind_name, &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10]),
         (journal_kind_name, &[1, 2, 3, 4, 5, 6, 7, 8, 9]),

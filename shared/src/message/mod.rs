@@ -65,7 +65,7 @@ pub use smoothed::{SMOOTHED_CUT, SMOOTHED_FLAGS, SmoothedState};
 pub use velocity::VelocityFix;
 
 /// Every struct of the contract, each after those that it holds.
-pub const LAYOUTS: [&Layout; 17] = [
+pub const LAYOUTS: [&Layout; 19] = [
     &Header::WIRE,
     &ImuSample::WIRE,
     &Odometry2d::WIRE,
@@ -81,8 +81,10 @@ pub const LAYOUTS: [&Layout; 17] = [
     &SmoothedState::WIRE,
     &Health::WIRE,
     &StateVector::WIRE,
+    &ProcessNoise::WIRE,
     &ControlRequest::WIRE,
     &ControlResponse::WIRE,
+    &JournalEntry::WIRE,
 ];
 
 /// How many sources of position an estimate reports on: source ids are `0..MAX_SOURCES`.

@@ -56,6 +56,8 @@ impl Use for Ask<'_> {
             let response = answer(&mut engine, &request, &terms, &mut Nowhere, &mut smoothed);
             assert_eq!(response.request_id, request.request_id);
             match response.status {
+                // The one answer that has a text without being a refusal.
+                CONTROL_OK if request.kind == CONTROL_CONFIG => {}
                 CONTROL_OK => assert_eq!(response.reason(), ""),
                 CONTROL_REFUSED => {
                     assert!(!response.reason().is_empty());

@@ -23,6 +23,8 @@
 #define INEKF_ESTIMATE_RESET 4u
 #define INEKF_ESTIMATE_DEGRADED 8u
 #define INEKF_ESTIMATE_REPLAYED 16u
+#define INEKF_ESTIMATE_RESUMED 32u
+#define INEKF_ESTIMATE_SMOOTHED 64u
 #define INEKF_SMOOTHED_CUT 1u
 #define INEKF_MODEL_IMU 1u
 #define INEKF_MODEL_ODOMETRY_3D 2u
@@ -45,6 +47,11 @@
 #define INEKF_CONTROL_SNAPSHOT 3u
 #define INEKF_CONTROL_BARRIER 4u
 #define INEKF_CONTROL_SMOOTHED 5u
+#define INEKF_CONTROL_PAUSE 6u
+#define INEKF_CONTROL_RESUME 7u
+#define INEKF_CONTROL_RELOAD_NOISE 8u
+#define INEKF_CONTROL_CONFIG 9u
+#define INEKF_CONTROL_TAKE 10u
 #define INEKF_CONTROL_OK 0u
 #define INEKF_CONTROL_REFUSED 1u
 
@@ -270,7 +277,7 @@ INEKF_CHECK(offsetof(InekfEstimateSe2, covariance) == 224);
 INEKF_CHECK(offsetof(InekfEstimateSe2, mismatch) == 272);
 INEKF_CHECK(offsetof(InekfEstimateSe2, mismatch_sigma) == 320);
 
-#define INEKF_SMOOTHED_STATE_TYPE "inekf.SmoothedState.v1"
+#define INEKF_SMOOTHED_STATE_TYPE "inekf.SmoothedState.v2"
 typedef struct InekfSmoothedState {
     INEKF_TYPE_NAME(INEKF_SMOOTHED_STATE_TYPE)
     uint64_t stamp_ns;
@@ -284,8 +291,9 @@ typedef struct InekfSmoothedState {
     double p_w_m[3];
     double gyro_bias_rps[3];
     double accel_bias_mps2[3];
+    double covariance[120];
 } InekfSmoothedState;
-INEKF_CHECK(sizeof(InekfSmoothedState) == 168);
+INEKF_CHECK(sizeof(InekfSmoothedState) == 1128);
 INEKF_CHECK(INEKF_ALIGN(InekfSmoothedState) == 8);
 INEKF_CHECK(offsetof(InekfSmoothedState, stamp_ns) == 0);
 INEKF_CHECK(offsetof(InekfSmoothedState, request_id) == 8);
@@ -298,8 +306,9 @@ INEKF_CHECK(offsetof(InekfSmoothedState, v_w_mps) == 72);
 INEKF_CHECK(offsetof(InekfSmoothedState, p_w_m) == 96);
 INEKF_CHECK(offsetof(InekfSmoothedState, gyro_bias_rps) == 120);
 INEKF_CHECK(offsetof(InekfSmoothedState, accel_bias_mps2) == 144);
+INEKF_CHECK(offsetof(InekfSmoothedState, covariance) == 168);
 
-#define INEKF_HEALTH_TYPE "inekf.Health.v2"
+#define INEKF_HEALTH_TYPE "inekf.Health.v3"
 typedef struct InekfHealth {
     INEKF_TYPE_NAME(INEKF_HEALTH_TYPE)
     uint64_t stamp_ns;
@@ -314,8 +323,11 @@ typedef struct InekfHealth {
     InekfCounters counters;
     uint64_t rejected_by_reason[16];
     uint64_t received[6];
+    uint64_t checkpoints;
+    uint64_t checkpoint_failures;
+    uint64_t journal_failures;
 } InekfHealth;
-INEKF_CHECK(sizeof(InekfHealth) == 280);
+INEKF_CHECK(sizeof(InekfHealth) == 304);
 INEKF_CHECK(INEKF_ALIGN(InekfHealth) == 8);
 INEKF_CHECK(offsetof(InekfHealth, stamp_ns) == 0);
 INEKF_CHECK(offsetof(InekfHealth, uptime_ns) == 8);
@@ -329,6 +341,9 @@ INEKF_CHECK(offsetof(InekfHealth, imu_rate_hz) == 48);
 INEKF_CHECK(offsetof(InekfHealth, counters) == 56);
 INEKF_CHECK(offsetof(InekfHealth, rejected_by_reason) == 104);
 INEKF_CHECK(offsetof(InekfHealth, received) == 232);
+INEKF_CHECK(offsetof(InekfHealth, checkpoints) == 280);
+INEKF_CHECK(offsetof(InekfHealth, checkpoint_failures) == 288);
+INEKF_CHECK(offsetof(InekfHealth, journal_failures) == 296);
 
 #define INEKF_STATE_VECTOR_TYPE "inekf.StateVector.v1"
 typedef struct InekfStateVector {
@@ -355,22 +370,53 @@ INEKF_CHECK(offsetof(InekfStateVector, gyro_bias_rps) == 96);
 INEKF_CHECK(offsetof(InekfStateVector, accel_bias_mps2) == 120);
 INEKF_CHECK(offsetof(InekfStateVector, covariance) == 144);
 
-#define INEKF_CONTROL_REQUEST_TYPE "inekf.ControlRequest.v1"
+#define INEKF_PROCESS_NOISE_TYPE "inekf.ProcessNoise.v1"
+typedef struct InekfProcessNoise {
+    INEKF_TYPE_NAME(INEKF_PROCESS_NOISE_TYPE)
+    uint32_t form;
+    uint32_t reserved;
+    double rotation;
+    double translation;
+    double lateral;
+    double gyro_bias_walk;
+    double accel_bias_walk;
+    double rotation_per_sqrt_m;
+    double rotation_per_sqrt_rad;
+    double translation_per_sqrt_m;
+} InekfProcessNoise;
+INEKF_CHECK(sizeof(InekfProcessNoise) == 72);
+INEKF_CHECK(INEKF_ALIGN(InekfProcessNoise) == 8);
+INEKF_CHECK(offsetof(InekfProcessNoise, form) == 0);
+INEKF_CHECK(offsetof(InekfProcessNoise, reserved) == 4);
+INEKF_CHECK(offsetof(InekfProcessNoise, rotation) == 8);
+INEKF_CHECK(offsetof(InekfProcessNoise, translation) == 16);
+INEKF_CHECK(offsetof(InekfProcessNoise, lateral) == 24);
+INEKF_CHECK(offsetof(InekfProcessNoise, gyro_bias_walk) == 32);
+INEKF_CHECK(offsetof(InekfProcessNoise, accel_bias_walk) == 40);
+INEKF_CHECK(offsetof(InekfProcessNoise, rotation_per_sqrt_m) == 48);
+INEKF_CHECK(offsetof(InekfProcessNoise, rotation_per_sqrt_rad) == 56);
+INEKF_CHECK(offsetof(InekfProcessNoise, translation_per_sqrt_m) == 64);
+
+#define INEKF_CONTROL_REQUEST_TYPE "inekf.ControlRequest.v2"
 typedef struct InekfControlRequest {
     INEKF_TYPE_NAME(INEKF_CONTROL_REQUEST_TYPE)
     uint32_t kind;
-    uint32_t reserved;
+    uint32_t argument;
     uint64_t request_id;
     InekfStateVector state;
+    InekfProcessNoise noise;
+    uint8_t input[136];
 } InekfControlRequest;
-INEKF_CHECK(sizeof(InekfControlRequest) == 1120);
+INEKF_CHECK(sizeof(InekfControlRequest) == 1328);
 INEKF_CHECK(INEKF_ALIGN(InekfControlRequest) == 8);
 INEKF_CHECK(offsetof(InekfControlRequest, kind) == 0);
-INEKF_CHECK(offsetof(InekfControlRequest, reserved) == 4);
+INEKF_CHECK(offsetof(InekfControlRequest, argument) == 4);
 INEKF_CHECK(offsetof(InekfControlRequest, request_id) == 8);
 INEKF_CHECK(offsetof(InekfControlRequest, state) == 16);
+INEKF_CHECK(offsetof(InekfControlRequest, noise) == 1120);
+INEKF_CHECK(offsetof(InekfControlRequest, input) == 1192);
 
-#define INEKF_CONTROL_RESPONSE_TYPE "inekf.ControlResponse.v3"
+#define INEKF_CONTROL_RESPONSE_TYPE "inekf.ControlResponse.v4"
 typedef struct InekfControlResponse {
     INEKF_TYPE_NAME(INEKF_CONTROL_RESPONSE_TYPE)
     uint64_t request_id;
@@ -383,9 +429,10 @@ typedef struct InekfControlResponse {
     uint64_t received[6];
     uint64_t rejected_by_reason[16];
     uint64_t smoothed;
+    uint64_t config_len;
     InekfStateVector state;
 } InekfControlResponse;
-INEKF_CHECK(sizeof(InekfControlResponse) == 1616);
+INEKF_CHECK(sizeof(InekfControlResponse) == 1624);
 INEKF_CHECK(INEKF_ALIGN(InekfControlResponse) == 8);
 INEKF_CHECK(offsetof(InekfControlResponse, request_id) == 0);
 INEKF_CHECK(offsetof(InekfControlResponse, status) == 8);
@@ -397,6 +444,24 @@ INEKF_CHECK(offsetof(InekfControlResponse, counters) == 280);
 INEKF_CHECK(offsetof(InekfControlResponse, received) == 328);
 INEKF_CHECK(offsetof(InekfControlResponse, rejected_by_reason) == 376);
 INEKF_CHECK(offsetof(InekfControlResponse, smoothed) == 504);
-INEKF_CHECK(offsetof(InekfControlResponse, state) == 512);
+INEKF_CHECK(offsetof(InekfControlResponse, config_len) == 512);
+INEKF_CHECK(offsetof(InekfControlResponse, state) == 520);
+
+#define INEKF_JOURNAL_ENTRY_TYPE "inekf.JournalEntry.v1"
+typedef struct InekfJournalEntry {
+    INEKF_TYPE_NAME(INEKF_JOURNAL_ENTRY_TYPE)
+    uint64_t index;
+    uint64_t estimates;
+    uint32_t kind;
+    uint32_t size;
+    uint8_t payload[1328];
+} InekfJournalEntry;
+INEKF_CHECK(sizeof(InekfJournalEntry) == 1352);
+INEKF_CHECK(INEKF_ALIGN(InekfJournalEntry) == 8);
+INEKF_CHECK(offsetof(InekfJournalEntry, index) == 0);
+INEKF_CHECK(offsetof(InekfJournalEntry, estimates) == 8);
+INEKF_CHECK(offsetof(InekfJournalEntry, kind) == 16);
+INEKF_CHECK(offsetof(InekfJournalEntry, size) == 20);
+INEKF_CHECK(offsetof(InekfJournalEntry, payload) == 24);
 
 #endif

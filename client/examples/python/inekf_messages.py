@@ -12,6 +12,8 @@ ESTIMATE_UPDATED = 2
 ESTIMATE_RESET = 4
 ESTIMATE_DEGRADED = 8
 ESTIMATE_REPLAYED = 16
+ESTIMATE_RESUMED = 32
+ESTIMATE_SMOOTHED = 64
 SMOOTHED_CUT = 1
 MODEL_IMU = 1
 MODEL_ODOMETRY_3D = 2
@@ -34,6 +36,11 @@ CONTROL_SET_STATE = 2
 CONTROL_SNAPSHOT = 3
 CONTROL_BARRIER = 4
 CONTROL_SMOOTHED = 5
+CONTROL_PAUSE = 6
+CONTROL_RESUME = 7
+CONTROL_RELOAD_NOISE = 8
+CONTROL_CONFIG = 9
+CONTROL_TAKE = 10
 CONTROL_OK = 0
 CONTROL_REFUSED = 1
 
@@ -333,8 +340,9 @@ class SmoothedState(ctypes.Structure):
         ("p_w_m", ctypes.c_double * 3),
         ("gyro_bias_rps", ctypes.c_double * 3),
         ("accel_bias_mps2", ctypes.c_double * 3),
+        ("covariance", ctypes.c_double * 120),
     ]
-    SIZE, ALIGN = 168, 8
+    SIZE, ALIGN = 1128, 8
     OFFSETS = [
         ("stamp_ns", 0),
         ("request_id", 8),
@@ -347,11 +355,12 @@ class SmoothedState(ctypes.Structure):
         ("p_w_m", 96),
         ("gyro_bias_rps", 120),
         ("accel_bias_mps2", 144),
+        ("covariance", 168),
     ]
 
     @staticmethod
     def type_name():
-        return "inekf.SmoothedState.v1"
+        return "inekf.SmoothedState.v2"
 
 
 class Health(ctypes.Structure):
@@ -368,8 +377,11 @@ class Health(ctypes.Structure):
         ("counters", Counters),
         ("rejected_by_reason", ctypes.c_uint64 * 16),
         ("received", ctypes.c_uint64 * 6),
+        ("checkpoints", ctypes.c_uint64),
+        ("checkpoint_failures", ctypes.c_uint64),
+        ("journal_failures", ctypes.c_uint64),
     ]
-    SIZE, ALIGN = 280, 8
+    SIZE, ALIGN = 304, 8
     OFFSETS = [
         ("stamp_ns", 0),
         ("uptime_ns", 8),
@@ -383,11 +395,14 @@ class Health(ctypes.Structure):
         ("counters", 56),
         ("rejected_by_reason", 104),
         ("received", 232),
+        ("checkpoints", 280),
+        ("checkpoint_failures", 288),
+        ("journal_failures", 296),
     ]
 
     @staticmethod
     def type_name():
-        return "inekf.Health.v2"
+        return "inekf.Health.v3"
 
 
 class StateVector(ctypes.Structure):
@@ -420,24 +435,60 @@ class StateVector(ctypes.Structure):
         return "inekf.StateVector.v1"
 
 
-class ControlRequest(ctypes.Structure):
+class ProcessNoise(ctypes.Structure):
     _fields_ = [
-        ("kind", ctypes.c_uint32),
+        ("form", ctypes.c_uint32),
         ("reserved", ctypes.c_uint32),
-        ("request_id", ctypes.c_uint64),
-        ("state", StateVector),
+        ("rotation", ctypes.c_double),
+        ("translation", ctypes.c_double),
+        ("lateral", ctypes.c_double),
+        ("gyro_bias_walk", ctypes.c_double),
+        ("accel_bias_walk", ctypes.c_double),
+        ("rotation_per_sqrt_m", ctypes.c_double),
+        ("rotation_per_sqrt_rad", ctypes.c_double),
+        ("translation_per_sqrt_m", ctypes.c_double),
     ]
-    SIZE, ALIGN = 1120, 8
+    SIZE, ALIGN = 72, 8
     OFFSETS = [
-        ("kind", 0),
+        ("form", 0),
         ("reserved", 4),
-        ("request_id", 8),
-        ("state", 16),
+        ("rotation", 8),
+        ("translation", 16),
+        ("lateral", 24),
+        ("gyro_bias_walk", 32),
+        ("accel_bias_walk", 40),
+        ("rotation_per_sqrt_m", 48),
+        ("rotation_per_sqrt_rad", 56),
+        ("translation_per_sqrt_m", 64),
     ]
 
     @staticmethod
     def type_name():
-        return "inekf.ControlRequest.v1"
+        return "inekf.ProcessNoise.v1"
+
+
+class ControlRequest(ctypes.Structure):
+    _fields_ = [
+        ("kind", ctypes.c_uint32),
+        ("argument", ctypes.c_uint32),
+        ("request_id", ctypes.c_uint64),
+        ("state", StateVector),
+        ("noise", ProcessNoise),
+        ("input", ctypes.c_uint8 * 136),
+    ]
+    SIZE, ALIGN = 1328, 8
+    OFFSETS = [
+        ("kind", 0),
+        ("argument", 4),
+        ("request_id", 8),
+        ("state", 16),
+        ("noise", 1120),
+        ("input", 1192),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "inekf.ControlRequest.v2"
 
 
 class ControlResponse(ctypes.Structure):
@@ -452,9 +503,10 @@ class ControlResponse(ctypes.Structure):
         ("received", ctypes.c_uint64 * 6),
         ("rejected_by_reason", ctypes.c_uint64 * 16),
         ("smoothed", ctypes.c_uint64),
+        ("config_len", ctypes.c_uint64),
         ("state", StateVector),
     ]
-    SIZE, ALIGN = 1616, 8
+    SIZE, ALIGN = 1624, 8
     OFFSETS = [
         ("request_id", 0),
         ("status", 8),
@@ -466,12 +518,35 @@ class ControlResponse(ctypes.Structure):
         ("received", 328),
         ("rejected_by_reason", 376),
         ("smoothed", 504),
-        ("state", 512),
+        ("config_len", 512),
+        ("state", 520),
     ]
 
     @staticmethod
     def type_name():
-        return "inekf.ControlResponse.v3"
+        return "inekf.ControlResponse.v4"
+
+
+class JournalEntry(ctypes.Structure):
+    _fields_ = [
+        ("index", ctypes.c_uint64),
+        ("estimates", ctypes.c_uint64),
+        ("kind", ctypes.c_uint32),
+        ("size", ctypes.c_uint32),
+        ("payload", ctypes.c_uint8 * 1328),
+    ]
+    SIZE, ALIGN = 1352, 8
+    OFFSETS = [
+        ("index", 0),
+        ("estimates", 8),
+        ("kind", 16),
+        ("size", 20),
+        ("payload", 24),
+    ]
+
+    @staticmethod
+    def type_name():
+        return "inekf.JournalEntry.v1"
 
 
 MESSAGES = [
@@ -490,8 +565,10 @@ MESSAGES = [
     SmoothedState,
     Health,
     StateVector,
+    ProcessNoise,
     ControlRequest,
     ControlResponse,
+    JournalEntry,
 ]
 
 

@@ -124,6 +124,7 @@ fn thread<'a>(
         );
         let reopened = vehicles.remove(index).reopen(node()?, instances[index])?;
         vehicles.insert(index, reopened);
+        tracing::info!(instance = %instances[index], "the ports are open again");
         outcome = run(&mut vehicles, &order.config.runtime, order.stop);
     }
     let mut outcome = outcome.map(|_| ());

@@ -167,15 +167,13 @@ pub fn files_deleted(plan: &Plan) -> Outcome {
             }
         }
         let started = Instant::now();
-        eventually("the daemon's notice", || {
+        // Until the daemon has its ports again, a reader would make services that are swept away under it.
+        eventually("the daemon's new ports", || {
             let said = daemon.stderr();
-            said.contains("opening them anew").then_some(())
+            said.contains("the ports are open again").then_some(())
         });
         killed(kill(feeder));
-        // Until the daemon has its ports again, a reader would make services that are swept away under it.
-        let mut observer = eventually("the daemon's new ports", || {
-            (!scene.memory.shared_files().is_empty()).then(|| scene.observer())
-        });
+        let mut observer = scene.observer();
         let next = scene.feeder(plan, 500);
         let estimate = observer.wait();
         times.push(started.elapsed());

@@ -122,7 +122,10 @@ fn thread<'a>(
             "files of this instance in shared memory were removed while it ran; opening them anew. Feeders and \
              readers have to be started again"
         );
-        let reopened = vehicles.remove(index).reopen(node()?, instances[index])?;
+        let Some(reopened) = vehicles.remove(index).reopen(instances[index], order.stop) else {
+            outcome = Ok(Ended::Stopped);
+            break;
+        };
         vehicles.insert(index, reopened);
         tracing::info!(instance = %instances[index], "the ports are open again");
         outcome = run(&mut vehicles, &order.config.runtime, order.stop);
@@ -134,14 +137,10 @@ fn thread<'a>(
     outcome
 }
 
-fn node() -> anyhow::Result<Node> {
-    Ok(transport::open_node("inekf-service")?)
-}
-
 /// Opens one vehicle.
 fn open<'a>(order: &Order<'a>, instance: &Instance) -> anyhow::Result<Box<dyn Work<'a> + 'a>> {
     let open = Open {
-        node: node()?,
+        node: transport::open_node("inekf-service")?,
         order,
         instance,
     };

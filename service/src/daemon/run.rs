@@ -4,7 +4,6 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::Node;
 
 use crate::config::{Runtime, WaitMode};
 
@@ -48,15 +47,12 @@ pub trait Work<'a> {
     /// Waiting is not possible.
     fn sleep(&mut self, bound: Duration) -> anyhow::Result<()>;
 
-    /// Opens its ports anew, on another node.
-    ///
-    /// # Errors
-    /// They cannot be opened.
+    /// Opens its ports anew, on another node: tries until it can, or until `stop` is set; then there is none.
     fn reopen(
         self: Box<Self>,
-        node: Node,
         instance: &Instance,
-    ) -> anyhow::Result<Box<dyn Work<'a> + 'a>>;
+        stop: &AtomicBool,
+    ) -> Option<Box<dyn Work<'a> + 'a>>;
 
     /// Accounts for what has come and will not be used, says so, and keeps what the next start needs.
     ///

@@ -6,6 +6,7 @@
 //! sent before it), checkpoint, health. A loop that spins does one chore between two looks at the
 //! samples, so that none of them finds it busy with more than that.
 
+use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
 use anyhow::Context;
@@ -15,7 +16,8 @@ use inekf_shared::message::{
     INPUT_VELOCITY, Message, REASON_WRONG_MODEL,
 };
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{InputMessage, Node};
+use inekf_shared::transport::{self, InputMessage};
+use tracing::warn;
 
 use super::control::answer;
 use super::journal::JournalPort;
@@ -27,6 +29,9 @@ use crate::config::Config;
 use crate::engine::resume::Resumption;
 use crate::engine::tally::Refusal;
 use crate::engine::{Engine, History, Model};
+
+/// Between two tries to open ports anew.
+const BETWEEN_TRIES: Duration = Duration::from_millis(100);
 
 /// What a vehicle is told once.
 #[derive(Clone, Copy, Debug)]
@@ -301,6 +306,14 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
     }
 }
 
+/// The ports of a vehicle on a node of their own, whose opening sweeps what is left of the old ones.
+fn open_anew<M: Model>(instance: &Instance, terms: &Terms<'_>) -> anyhow::Result<Ports<M>> {
+    let node = transport::open_node("inekf-service")?;
+    let mut ports = Ports::open_on(node, instance, terms.config, terms.stepped)?;
+    ports.watch_files()?;
+    Ok(ports)
+}
+
 impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M, H> {
     fn turn(&mut self) -> anyhow::Result<Turn> {
         let any = !self.terms.stepped && self.take_samples()?;
@@ -326,9 +339,9 @@ impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M
 
     fn reopen(
         self: Box<Self>,
-        node: Node,
         instance: &Instance,
-    ) -> anyhow::Result<Box<dyn Work<'a> + 'a>> {
+        stop: &AtomicBool,
+    ) -> Option<Box<dyn Work<'a> + 'a>> {
         let Self {
             engine,
             ports,
@@ -338,9 +351,25 @@ impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M
         } = *self;
         // Their places first, or the new ones would take them for another daemon's.
         drop(ports);
-        let mut ports = Ports::open_on(node, instance, terms.config, terms.stepped)?;
-        ports.watch_files()?;
-        Ok(Box::new(Self::new(engine, ports, terms, keeper)))
+        let mut is_said = false;
+        loop {
+            match open_anew(instance, &terms) {
+                Ok(ports) => return Some(Box::new(Self::new(engine, ports, terms, keeper))),
+                Err(error) if !core::mem::replace(&mut is_said, true) => {
+                    warn!(
+                        "not yet, and tried again: do feeders or readers hold the removed files? {error:#}"
+                    );
+                }
+                Err(_) => {}
+            }
+            if stop.load(Ordering::Relaxed) {
+                if let Some(keeper) = keeper {
+                    keeper.finish(engine.snapshot());
+                }
+                return None;
+            }
+            std::thread::sleep(BETWEEN_TRIES);
+        }
     }
 
     fn finish(mut self: Box<Self>) -> anyhow::Result<()> {

@@ -167,12 +167,16 @@ pub fn files_deleted(plan: &Plan) -> Outcome {
             }
         }
         let started = Instant::now();
+        eventually("the daemon's notice", || {
+            let said = daemon.stderr();
+            said.contains("opening them anew").then_some(())
+        });
+        killed(kill(feeder));
         // Until the daemon has its ports again, a reader would make services that are swept away under it.
         eventually("the daemon's new ports", || {
             let said = daemon.stderr();
             said.contains("the ports are open again").then_some(())
         });
-        killed(kill(feeder));
         let mut observer = scene.observer();
         let next = scene.feeder(plan, 500);
         let estimate = observer.wait();

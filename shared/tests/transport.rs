@@ -477,7 +477,7 @@ fn reserved_memory_is_backed_before_it_is_written() {
     assert!(largest.0 > 8 * 1024 * 1288);
     // Its publisher has backed it as a whole; the others are still to be backed.
     assert!(largest.1 >= largest.0);
-    let total = transport::reserve_shared_memory(&node).unwrap();
+    let total = transport::reserve_shared_memory(node.config()).unwrap();
     assert!(sizes().iter().all(|(len, backed)| backed >= len));
     assert_eq!(total, sizes().iter().map(|(len, _)| len).sum::<u64>());
     publisher.send_copy(EstimateSe23::ZERO).unwrap();

@@ -96,6 +96,9 @@ fn the_upper_triangle_is_read_row_by_row() {
     let expected = SMatrix::<f64, 3, 3>::new(1.0, 2.0, 3.0, 2.0, 4.0, 5.0, 3.0, 5.0, 6.0);
     assert_eq!(p.matrix(), &expected);
     assert_eq!(p.upper_triangle().collect::<Vec<_>>(), rows);
+    let mut written = [0.0; 7];
+    p.write_upper_triangle(&mut written);
+    assert_eq!(written, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.0]);
 }
 
 #[test]
@@ -103,6 +106,9 @@ fn the_upper_triangle_comes_back_bit_for_bit() {
     let p = covariance_of_scale::<15>(&sigmas(1.0), &mut seeded(54));
     let entries: Vec<f64> = p.upper_triangle().collect();
     assert_eq!(entries.len(), 120);
+    let mut written = [0.0; 120];
+    p.write_upper_triangle(&mut written);
+    assert_eq!(written, entries[..]);
     assert_eq!(Covariance::from_upper_triangle(&entries), Some(p));
     assert_eq!(Covariance::<15>::from_upper_triangle(&entries[1..]), None);
     let one_more = [entries.as_slice(), &[0.0]].concat();

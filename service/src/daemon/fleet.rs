@@ -4,6 +4,7 @@
 //! vehicle has a thread of its own; spinning, they are dealt onto as many threads as asked for.
 
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
@@ -11,7 +12,7 @@ use anyhow::Context;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::EstimateMessage;
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Node};
+use inekf_shared::transport::{self, Node, TransportError};
 
 use super::ports::Ports;
 use super::realtime;
@@ -50,9 +51,16 @@ pub fn serve(order: &Order<'_>, ready: impl FnOnce() -> anyhow::Result<()>) -> a
         WaitMode::Event => order.instances.len(),
         WaitMode::Spin => order.config.fleet.threads.min(order.instances.len()),
     };
+    let ready = || {
+        // Better an error now than a SIGBUS at some later send.
+        transport::reserve_shared_memory(&transport::config_from_env()?)?;
+        ready()
+    };
     if threads <= 1 {
-        return thread(order, order.instances.iter(), 0, ready);
+        return thread(order, order.instances.iter(), 0, transport::open_node, ready);
     }
+    // Once for all threads, before any of them meets what killed processes left.
+    transport::sweep(&transport::config_from_env()?)?;
     std::thread::scope(|scope| {
         let (tell, open) = channel();
         let mut handles = Vec::with_capacity(threads);
@@ -60,7 +68,7 @@ pub fn serve(order: &Order<'_>, ready: impl FnOnce() -> anyhow::Result<()>) -> a
             let tell: Sender<()> = tell.clone();
             let work = move || {
                 let own = order.instances.iter().skip(index).step_by(threads);
-                let outcome = thread(order, own, index, || {
+                let outcome = thread(order, own, index, transport::open_another_node, || {
                     // Whoever waits for it has gone only if another thread has failed.
                     let _ = tell.send(());
                     Ok(())
@@ -101,18 +109,19 @@ pub fn serve(order: &Order<'_>, ready: impl FnOnce() -> anyhow::Result<()>) -> a
     })
 }
 
+/// How a thread gets its node.
+type OpenNode = fn(&str) -> Result<Node, TransportError>;
+
 /// Opens and runs the vehicles of one thread, the one with this `index`.
 fn thread<'a>(
     order: &Order<'a>,
     instances: impl Iterator<Item = &'a Instance>,
     index: usize,
+    open_node: OpenNode,
     ready: impl FnOnce() -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
     let instances: Vec<&Instance> = instances.collect();
-    let mut vehicles = Vec::with_capacity(instances.len());
-    for instance in &instances {
-        vehicles.push(open(order, instance)?);
-    }
+    let mut vehicles = open_all(order, &instances, open_node)?;
     realtime::apply(&order.config.runtime, index);
     ready()?;
     let mut outcome = run(&mut vehicles, &order.config.runtime, order.stop);
@@ -137,18 +146,27 @@ fn thread<'a>(
     outcome
 }
 
-/// Opens one vehicle.
-fn open<'a>(order: &Order<'a>, instance: &Instance) -> anyhow::Result<Box<dyn Work<'a> + 'a>> {
-    let open = Open {
-        node: transport::open_node("inekf-service")?,
-        order,
-        instance,
+/// Opens the vehicles of one thread on one node: a node of its own for each would have to look at those of all others.
+fn open_all<'a>(
+    order: &Order<'a>,
+    instances: &[&Instance],
+    open_node: OpenNode,
+) -> anyhow::Result<Vec<Box<dyn Work<'a> + 'a>>> {
+    let node = Rc::new(open_node("inekf-service")?);
+    let open = |instance: &&Instance| {
+        let node = Rc::clone(&node);
+        let open = Open {
+            node,
+            order,
+            instance,
+        };
+        engine::build(order.config, open)?
     };
-    engine::build(order.config, open)?
+    instances.iter().map(open).collect()
 }
 
 struct Open<'o, 'a> {
-    node: Node,
+    node: Rc<Node>,
     order: &'o Order<'a>,
     instance: &'o Instance,
 }

@@ -1,5 +1,7 @@
 //! Every shared-memory port of the daemon, opened before it says that it is ready.
 
+use std::rc::Rc;
+
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
     EstimateHead, EstimateMessage, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
@@ -125,17 +127,19 @@ pub struct Ports<M: Model> {
     /// Woken by feeders in event mode; without a listener their notifications cost nothing.
     pub wake: Option<WakeListener>,
     guard: Guard,
-    node: Node,
+    // Kept until the ports are gone; a fleet's vehicles share one.
+    node: Rc<Node>,
 }
 
 impl<M: Model> Ports<M> {
-    /// Opens every port of `instance` that this configuration needs; a `stepped` daemon publishes no journal.
+    /// Opens every port of `instance` that this configuration needs; a `stepped` daemon publishes no journal. The
+    /// memory behind them is still to be asked for ([`transport::reserve_shared_memory`]).
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy. If a daemon of this instance is
     /// running, the error names its process id.
     pub fn open_on(
-        node: Node,
+        node: Rc<Node>,
         instance: &Instance,
         config: &Config,
         stepped: bool,
@@ -166,7 +170,7 @@ impl<M: Model> Ports<M> {
             odometry2d: foreign::<M, _>(&inputs.odometry2d, INPUT_ODOMETRY_2D)?,
             odometry3d: foreign::<M, _>(&inputs.odometry3d, INPUT_ODOMETRY_3D)?,
         };
-        let ports = Self {
+        Ok(Self {
             inputs: Inputs {
                 samples: transport::input::<M::Sample>(&node, instance)?.subscriber()?,
                 position: FixPort::new(inputs.position.subscriber()?, uses_position),
@@ -182,10 +186,7 @@ impl<M: Model> Ports<M> {
             wake,
             guard: Guard::default(),
             node,
-        };
-        // Better an error now than a SIGBUS at some later send.
-        transport::reserve_shared_memory(&ports.node)?;
-        Ok(ports)
+        })
     }
 
     /// Has an eye on the files from now on: call it once nothing is open any more that is closed again, and if this is the only vehicle of its process: those of several cannot be told

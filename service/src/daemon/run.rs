@@ -29,7 +29,7 @@ pub enum Ended {
 
 /// One vehicle's work, as a loop sees it.
 pub trait Work<'a> {
-    /// Takes the samples that have come, then does one chore.
+    /// Takes the samples that have come, then does one chore if it is time for one.
     ///
     /// # Errors
     /// A port that fails for good. What a sender wrote is never an error.

@@ -3,11 +3,12 @@
 //! Motion samples come first; before each, the fixes that are due by its stamp and were sent before
 //! it, while later ones stay in their queue (so what a sender gets does not depend on how far ahead
 //! it is). Everything else is a chore: late fixes that came alone, requests (each after every input
-//! sent before it), checkpoint, health. A loop that spins does one chore between two looks at the
+//! sent before it), checkpoint, health. A loop that spins does one chore between some looks at the
 //! samples, so that none of them finds it busy with more than that.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
+use std::rc::Rc;
 
 use anyhow::Context;
 use inekf_shared::clock::monotonic_ns;
@@ -30,6 +31,9 @@ use crate::engine::resume::Resumption;
 use crate::engine::tally::Refusal;
 use crate::engine::{Engine, History, Model};
 
+/// Looks at the samples of a loop that spins between two chores: a sample rarely finds it at one, and every chore has
+/// its turn within microseconds.
+const LOOKS_PER_CHORE: usize = 4;
 /// Between two tries to open ports anew.
 const BETWEEN_TRIES: Duration = Duration::from_millis(100);
 
@@ -53,7 +57,7 @@ pub struct Vehicle<'a, M: Model, H> {
     terms: Terms<'a>,
     keeper: Option<Keeper>,
     watch: Watch,
-    /// Chores done so far: whose turn it is.
+    /// Looks so far: whose turn it is.
     turns: usize,
 }
 
@@ -308,8 +312,9 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
 
 /// The ports of a vehicle on a node of their own, whose opening sweeps what is left of the old ones.
 fn open_anew<M: Model>(instance: &Instance, terms: &Terms<'_>) -> anyhow::Result<Ports<M>> {
-    let node = transport::open_node("inekf-service")?;
-    let mut ports = Ports::open_on(node, instance, terms.config, terms.stepped)?;
+    let node = Rc::new(transport::open_node("inekf-service")?);
+    let mut ports = Ports::open_on(Rc::clone(&node), instance, terms.config, terms.stepped)?;
+    transport::reserve_shared_memory(node.config())?;
     ports.watch_files()?;
     Ok(ports)
 }
@@ -317,8 +322,10 @@ fn open_anew<M: Model>(instance: &Instance, terms: &Terms<'_>) -> anyhow::Result
 impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M, H> {
     fn turn(&mut self) -> anyhow::Result<Turn> {
         let any = !self.terms.stepped && self.take_samples()?;
-        self.turns = (self.turns + 1) % CHORES.len();
-        self.attend(CHORES[self.turns])?;
+        self.turns = (self.turns + 1) % (CHORES.len() * LOOKS_PER_CHORE);
+        if self.turns.is_multiple_of(LOOKS_PER_CHORE) {
+            self.attend(CHORES[self.turns / LOOKS_PER_CHORE])?;
+        }
         Ok(self.after(any))
     }
 

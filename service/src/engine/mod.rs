@@ -13,6 +13,7 @@
 //!   a smoother; [`stack`]: fixes taken together;
 //!   [`recovery`]: out of a lock-out
 //! - [`output`]: the messages
+//! - [`processor`]: instructions that not every processor has
 
 pub mod build;
 pub mod driver;
@@ -24,6 +25,7 @@ pub mod levelling;
 pub mod model;
 pub mod odometry;
 pub mod output;
+pub mod processor;
 pub mod recovery;
 pub mod resume;
 pub mod set_state;

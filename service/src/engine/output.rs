@@ -1,6 +1,6 @@
 //! From beliefs to messages: what is published, with its stamps, flags and counters.
 
-use inekf::filter::{Covariance, Verdict};
+use inekf::filter::Verdict;
 use inekf_shared::message::{
     ESTIMATE_DEGRADED, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED, ESTIMATE_RESET, ESTIMATE_RESUMED,
     ESTIMATE_SMOOTHED, ESTIMATE_UPDATED, EstimateHead, EstimateMessage, NO_SOURCE, REASON_INTERNAL,
@@ -184,12 +184,5 @@ impl<E: EstimateMessage> Output<E> {
         (head.flags, head.state, head.source) = (flags, state, source);
         head.counters = self.tally.counters;
         outbox.publish(&mut self.message);
-    }
-}
-
-/// Writes the upper triangle of `covariance` to the front of `triangle`.
-pub fn write_triangle<const D: usize>(triangle: &mut [f64], covariance: &Covariance<D>) {
-    for (slot, entry) in triangle.iter_mut().zip(covariance.upper_triangle()) {
-        *slot = entry;
     }
 }

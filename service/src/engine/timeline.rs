@@ -230,12 +230,17 @@ impl<M: Model> History<M> for Timeline<M> {
             stamp_ns,
             input,
         };
-        let mut state = from.state;
+        // In the place from which it goes into the ring: a state is two kilobytes.
+        let mut knot = Knot {
+            stamp_ns,
+            input: Some(input),
+            state: from.state,
+        };
         let mut sound = true;
         self.run_interval(
             model,
             &interval,
-            &mut state,
+            &mut knot.state,
             &mut |timeline, index, event| match event {
                 Passed::Sample(state) => {
                     sound &= model.is_sound(state);
@@ -255,11 +260,7 @@ impl<M: Model> History<M> for Timeline<M> {
                 }
             },
         );
-        self.push(Knot {
-            stamp_ns,
-            input: Some(input),
-            state,
-        });
+        self.push(knot);
         if sound { Ok(()) } else { Err(Breakdown) }
     }
 

@@ -28,7 +28,7 @@
 //! let estimates = transport::estimate::<EstimateSe23>(&node, &instance)?.publisher()?;
 //! let latest = transport::latest(&node, &instance, EstimateSe23::ZERO)?.writer()?;
 //! let listener = transport::wake(&node, &instance)?.listener()?;
-//! transport::reserve_shared_memory(&node)?;
+//! transport::reserve_shared_memory(node.config())?;
 //!
 //! // Loaning allocates in iceoryx2, so the outlet does it ahead, off the path from input to estimate.
 //! let mut estimates = transport::Outlet::new(estimates, 1);
@@ -112,7 +112,7 @@ pub use error::TransportError;
 pub use iceoryx2::config::Config;
 pub use node::{
     IPC_PREFIX_VARIABLE, IPC_ROOT_AND_PREFIX_MAX_LEN, IPC_ROOT_VARIABLE, Node, config,
-    config_from_env, open_node, open_node_with, remove_node_counter,
+    config_from_env, open_another_node, open_node, open_node_with, remove_node_counter,
 };
 pub use open::{
     InputMessage, Inputs, control, estimate, estimate_model, health, input, inputs, journal,

@@ -140,6 +140,19 @@ pub fn open_node(name: &str) -> Result<Node, TransportError> {
     open_node_with(name, &config_from_env()?)
 }
 
+/// Creates one node of many in a process that has swept ([`sweep()`](super::sweep())): nodes that each look at all others
+/// would take the square of the time.
+///
+/// # Errors
+/// As [`open_node`].
+pub fn open_another_node(name: &str) -> Result<Node, TransportError> {
+    require_descriptors()?;
+    let mut config = config_from_env()?;
+    config.global.node.cleanup_dead_nodes_on_creation = false;
+    config.global.node.cleanup_dead_nodes_on_destruction = false;
+    create(name, &config)
+}
+
 /// Creates a node under `config`.
 ///
 /// Signals are left alone: iceoryx2 would otherwise take over SIGINT and SIGTERM at the first wait. What killed
@@ -149,16 +162,21 @@ pub fn open_node(name: &str) -> Result<Node, TransportError> {
 /// [`TransportError::Node`]; [`TransportError::Space`] or [`TransportError::Descriptors`] if there is too little of
 /// either for anything to be opened.
 pub fn open_node_with(name: &str, config: &Config) -> Result<Node, TransportError> {
+    require_descriptors()?;
+    require_shared_memory(LEAST_FREE)?;
+    // What could not be swept need not stand in the way; if it does, whatever it blocks says so.
+    let _ = sweep(config);
+    create(name, config)
+}
+
+fn create(name: &str, config: &Config) -> Result<Node, TransportError> {
     let refuse = |cause: String| TransportError::Node {
         node: name.to_owned(),
         root: config.global.root_path().to_string(),
         cause,
     };
     let node_name = NodeName::new(name).map_err(|error| refuse(format!("{error:?}")))?;
-    require_descriptors()?;
     require_shared_memory(LEAST_FREE)?;
-    // What could not be swept need not stand in the way; if it does, whatever it blocks says so.
-    let _ = sweep(config);
     let node = NodeBuilder::new()
         .name(&node_name)
         .config(config)

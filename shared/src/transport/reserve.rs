@@ -8,24 +8,25 @@ use std::collections::BTreeSet;
 use std::fs::{self, OpenOptions};
 use std::io;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::inspect::SHARED_MEMORY;
-use super::{Config, Node, TransportError};
+use super::{Config, TransportError};
 
 /// Backs all shared memory of iceoryx2 that this process has mapped by now, and returns its size in bytes. Call it when
-/// all ports are made. Connections to ports that come later are not covered; they are small.
+/// all ports are made, once: it looks at every file. Connections to ports that come later are not covered; they are small.
 ///
 /// # Errors
 /// [`TransportError::Space`] if there is too little, [`TransportError::Reserve`] if the files cannot be worked with.
-pub fn reserve_shared_memory(node: &Node) -> Result<u64, TransportError> {
+pub fn reserve_shared_memory(config: &Config) -> Result<u64, TransportError> {
     let maps = fs::read_to_string("/proc/self/maps").map_err(|error| TransportError::Reserve {
         path: "/proc/self/maps".to_owned(),
         cause: error.to_string(),
     })?;
-    let prefix = node.config().global.prefix.to_string();
+    let prefix = config.global.prefix.to_string();
     let mut total = 0;
     for path in mapped_files(&maps, &prefix) {
         total += reserve(&path)?;
@@ -57,16 +58,32 @@ pub(super) fn require_descriptors() -> Result<(), TransportError> {
     })
 }
 
+/// How the names of data segments begin before the id of their port: what stands there is a hash of iceoryx2's own,
+/// found out by looking once, because a folder with thousands of files is slow to look through for every port.
+static BEGINNINGS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+
 /// Backs the data segment of the port `id` as a whole.
 pub(super) fn reserve_segment_of(config: &Config, id: u128) -> Result<(), TransportError> {
     let prefix = config.global.prefix.to_string();
     let end = format!("{id}{}", config.global.service.data_segment_suffix);
+    let mut beginnings = BEGINNINGS.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = beginnings
+        .iter()
+        .filter(|beginning| beginning.starts_with(&prefix))
+        .map(|beginning| Path::new(SHARED_MEMORY).join(format!("{beginning}{end}")))
+        .find(|path| path.exists());
+    if let Some(path) = known {
+        return reserve(&path.display().to_string()).map(drop);
+    }
     let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
         return Ok(());
     };
     for entry in entries.filter_map(Result::ok) {
         let name = entry.file_name().to_string_lossy().into_owned();
-        if name.starts_with(&prefix) && name.ends_with(&end) {
+        if let Some(beginning) = name.strip_suffix(&end)
+            && beginning.starts_with(&prefix)
+        {
+            beginnings.insert(beginning.to_owned());
             reserve(&entry.path().display().to_string())?;
         }
     }

@@ -1,6 +1,7 @@
 //! What the estimation thread allocates: nothing but what iceoryx2 needs for the slot of an estimate to come, which is
 //! loaned after the one before has left.
 
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use inekf_service::config::Config;
@@ -29,7 +30,7 @@ impl Use for Serve<'_> {
     type Output = ();
 
     fn with<M: Model + 'static, H: History<M> + 'static>(self, engine: Engine<M, H>) {
-        let node = self.memory.node();
+        let node = Rc::new(self.memory.node());
         let ports = Ports::open_on(node, &instance(INSTANCE), self.config, false);
         let terms = Terms {
             config: self.config,

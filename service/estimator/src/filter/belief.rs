@@ -43,6 +43,16 @@ impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
         covariance
     }
 
+    /// Hands the covariance of the left-invariant error to `read`, as it lies here if it is that one already.
+    #[inline]
+    pub fn with_left_covariance<T>(&self, read: impl FnOnce(&Covariance<D>) -> T) -> T {
+        if S::IS_LEFT {
+            read(&self.covariance)
+        } else {
+            read(&self.left_covariance())
+        }
+    }
+
     /// Whether mean and covariance are finite and no variance is negative.
     pub fn is_plausible(&self) -> bool {
         self.mean.is_finite() && self.covariance.is_plausible()

@@ -258,6 +258,19 @@ impl<const D: usize> Covariance<D> {
         sums.iter().all(|sum| *sum == 0.0) && (0..D).all(|i| self.0[(i, i)] >= 0.0)
     }
 
+    /// Writes the upper triangle, row by row, to the front of `entries`, as far as there is room.
+    pub fn write_upper_triangle(&self, entries: &mut [f64]) {
+        let mut rest = entries;
+        for (row, column) in self.0.data.0.iter().enumerate() {
+            // The matrix is symmetric: what stands right of the diagonal in a row lies together below it in a column.
+            let Some((front, behind)) = rest.split_at_mut_checked(D - row) else {
+                return;
+            };
+            front.copy_from_slice(&column[row..]);
+            rest = behind;
+        }
+    }
+
     /// The upper triangle, row by row.
     pub fn upper_triangle(&self) -> impl Iterator<Item = f64> + '_ {
         (0..D).flat_map(move |row| (row..D).map(move |column| self.0[(row, column)]))

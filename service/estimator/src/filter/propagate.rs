@@ -25,8 +25,9 @@ pub fn propagate<G: InertialState<D>, S: InertialSide, const D: usize>(
     moved
 }
 
-/// [`propagate`] without a second belief.
-#[inline]
+/// [`propagate`] without a second belief. Part of whatever calls it, so that it is compiled for the instructions that
+/// are used there.
+#[inline(always)]
 pub fn propagate_in_place<G: InertialState<D>, S: InertialSide, const D: usize>(
     belief: &mut Belief<G, S, D>,
     measured: &ImuInput,

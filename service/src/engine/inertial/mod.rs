@@ -3,7 +3,7 @@
 use inekf::filter::{
     Alignment, Belief, InertialSide, Levelled, UpdateError, Verdict, propagate_in_place,
 };
-use inekf::lie::SO3;
+use inekf::lie::{LieGroup, SO3};
 use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState};
 use inekf::smoother::Preintegration;
 use inekf_shared::message::{
@@ -16,7 +16,7 @@ use super::driver::Engine;
 use super::fix::Fix;
 use super::levelling::Levelling;
 use super::model::{Fused, Model, Preceding};
-use super::output::write_triangle;
+use super::processor::{Processor, Work};
 use super::recovery::Widening;
 use super::resume::Doubt;
 use super::settings::{
@@ -37,6 +37,7 @@ pub struct Inertial<G, S, const D: usize> {
     imu: ImuSettings,
     initial: InitialSettings,
     fusion: FusionSettings,
+    processor: Processor,
     levelling: Levelling,
     filter: core::marker::PhantomData<(G, S)>,
 }
@@ -69,6 +70,7 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Inertial<G, S, D> {
             imu: settings.imu,
             initial: settings.initial,
             fusion: settings.fusion,
+            processor: Processor::detect(),
             levelling: Levelling::new(window_ns),
             filter: core::marker::PhantomData,
         }
@@ -188,14 +190,12 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
     }
 
     fn advance(&self, belief: &mut Belief<G, S, D>, motion: &ImuMotion, part_ns: u64) {
-        propagate_in_place(
+        self.processor.run(Advance {
             belief,
-            &motion.held,
-            &self.imu.g_w,
-            seconds(part_ns),
-            self.imu.discretisation,
-            &motion.noise,
-        );
+            motion,
+            imu: &self.imu,
+            part_ns,
+        });
     }
 
     /// One step of propagation, whatever the discretisation of the samples: the rates are constant over it.
@@ -230,15 +230,16 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
     fn is_sound(&self, belief: &Belief<G, S, D>) -> bool {
         let mean = &belief.mean;
         let pose = mean.pose();
-        mean.is_finite()
-            && pose.position.amax() <= MAX_POSITION_M
-            && pose.velocity.amax() <= MAX_VELOCITY_MPS
-            && mean.gyro_bias().amax() <= self.imu.max_gyro
-            && mean.accel_bias().amax() <= self.imu.max_accel
-            && (0..D).all(|i| {
-                let variance = belief.covariance.matrix()[(i, i)];
-                variance.is_finite() && variance >= 0.0
-            })
+        // Asked of every sample: without a branch for each number. NaN is not within anything.
+        let variances = belief.covariance.matrix().diagonal();
+        pose.rotation.is_finite()
+            & is_within(&pose.position, MAX_POSITION_M)
+            & is_within(&pose.velocity, MAX_VELOCITY_MPS)
+            & is_within(&mean.gyro_bias(), self.imu.max_gyro)
+            & is_within(&mean.accel_bias(), self.imu.max_accel)
+            & variances
+                .iter()
+                .fold(true, |sound, variance| sound & (0.0..=f64::MAX).contains(variance))
     }
 
     fn fuse(
@@ -284,7 +285,7 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
         message.p_w_m = pose.position.into();
         message.gyro_bias_rps = belief.mean.gyro_bias().into();
         message.accel_bias_mps2 = belief.mean.accel_bias().into();
-        write_triangle(&mut message.covariance, &belief.left_covariance());
+        belief.with_left_covariance(|p| p.write_upper_triangle(&mut message.covariance));
     }
 
     fn snapshot(&self, stamp_ns: u64, belief: &Belief<G, S, D>) -> StateVector {
@@ -300,9 +301,38 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
             accel_bias_mps2: belief.mean.accel_bias().into(),
             ..StateVector::ZERO
         };
-        write_triangle(&mut state.covariance, &belief.left_covariance());
+        belief.with_left_covariance(|p| p.write_upper_triangle(&mut state.covariance));
         state
     }
+}
+
+/// The step that every sample takes.
+struct Advance<'a, G, S, const D: usize> {
+    belief: &'a mut Belief<G, S, D>,
+    motion: &'a ImuMotion,
+    imu: &'a ImuSettings,
+    part_ns: u64,
+}
+
+impl<G: InertialState<D>, S: InertialSide, const D: usize> Work for Advance<'_, G, S, D> {
+    #[inline(always)]
+    fn run(self) {
+        propagate_in_place(
+            self.belief,
+            &self.motion.held,
+            &self.imu.g_w,
+            seconds(self.part_ns),
+            self.imu.discretisation,
+            &self.motion.noise,
+        );
+    }
+}
+
+/// Whether no component is larger than `limit`.
+fn is_within(vector: &Vector3<f64>, limit: f64) -> bool {
+    vector
+        .iter()
+        .fold(true, |within, component| within & (component.abs() <= limit))
 }
 
 /// Every so many fixes of a sender the covariance is looked at, and mended if rounding has made it indefinite: far more

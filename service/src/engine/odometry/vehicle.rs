@@ -13,7 +13,6 @@ use inekf_shared::message::{
 use inekf_shared::transport::InputMessage;
 use nalgebra::{SVector, Vector3};
 
-use super::super::output::write_triangle;
 use super::filter::Report;
 
 /// How far the attitude of a planar state may lean, rad.
@@ -80,7 +79,7 @@ pub fn snapshot<G: Vehicle<D, N>, const D: usize, const N: usize>(
         p_w_m: position_w.into(),
         ..StateVector::ZERO
     };
-    write_triangle(&mut state.covariance, &belief.covariance);
+    belief.covariance.write_upper_triangle(&mut state.covariance);
     state
 }
 
@@ -126,7 +125,7 @@ impl Vehicle<3, 2> for SE2 {
     fn write(belief: &Belief<Self, Left, 3>, report: &Report, message: &mut EstimateSe2) {
         message.theta_rad = belief.mean.rotation.angle_rad();
         message.p_w_m = belief.mean.position.into();
-        write_triangle(&mut message.covariance, &belief.covariance);
+        belief.covariance.write_upper_triangle(&mut message.covariance);
         note(report, &mut message.mismatch, &mut message.mismatch_sigma);
     }
 }
@@ -161,7 +160,7 @@ impl Vehicle<6, 3> for SE3 {
     fn write(belief: &Belief<Self, Left, 6>, report: &Report, message: &mut EstimateSe3) {
         message.q_wb = belief.mean.rotation.quaternion_xyzw();
         message.p_w_m = belief.mean.position.into();
-        write_triangle(&mut message.covariance, &belief.covariance);
+        belief.covariance.write_upper_triangle(&mut message.covariance);
         note(report, &mut message.mismatch, &mut message.mismatch_sigma);
     }
 }

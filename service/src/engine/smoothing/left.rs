@@ -6,7 +6,6 @@ use inekf::filter::{Belief, Covariance, Left as Side};
 use inekf::model::InertialState;
 use inekf_shared::message::{SMOOTHED_CUT, SmoothedState, Zero};
 
-use super::super::output::write_triangle;
 
 /// A bounded queue: if nobody takes the states, the oldest give way, as they do for a slow reader.
 #[derive(Debug)]
@@ -34,7 +33,7 @@ pub(super) fn message<G: InertialState<D>, const D: usize>(
         accel_bias_mps2: chi.accel_bias().into(),
         ..SmoothedState::ZERO
     };
-    write_triangle(&mut state.covariance, covariance);
+    covariance.write_upper_triangle(&mut state.covariance);
     state
 }
 

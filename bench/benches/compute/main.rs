@@ -4,12 +4,14 @@
 //! `cargo bench -p inekf-bench --bench compute [-- FILTER]` times; with `-- --instructions [FILTER]` callgrind counts
 //! (needs valgrind). Every figure is one call on data in the first cache, as the daemon makes it: in place, on a belief
 //! that the call before it did not touch. A name that ends in `/dense` is the same result by general matrix products,
-//! written in [`dense`]; the two are compared before anything is measured.
+//! written in [`dense`]; the two are compared before anything is measured. A name that ends in `/any processor` is
+//! the same without the instructions that not every processor has; the results are the same bit for bit.
 
 use std::process::ExitCode;
 
 mod clock;
 mod dense;
+mod engine;
 mod groups;
 mod instructions;
 mod predict;
@@ -27,6 +29,7 @@ fn routines(suite: &mut impl Suite) {
     update::routines(suite);
     groups::routines(suite);
     smoother::routines(suite);
+    engine::routines(suite);
 }
 
 fn main() -> ExitCode {

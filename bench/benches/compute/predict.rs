@@ -5,17 +5,41 @@ use core::hint::black_box;
 use inekf::filter::{Belief, InertialSide, Left, Right, propagate_in_place};
 use inekf::lie::SE23;
 use inekf::model::{Discretisation, InertialState, NavState};
+use inekf_service::engine::processor::{Processor, Work};
 
 use crate::dense;
 use crate::setup::{DT_S, GRAVITY_W, NOISE, assert_same, belief, sample, state};
 use crate::suite::Suite;
 
+/// The step, for the instructions that a processor has.
+struct Step<'a, G, S, const D: usize> {
+    belief: &'a mut Belief<G, S, D>,
+    discretisation: Discretisation,
+}
+
+impl<G: InertialState<D>, S: InertialSide, const D: usize> Work for Step<'_, G, S, D> {
+    #[inline(always)]
+    fn run(self) {
+        propagate_in_place(
+            self.belief,
+            &black_box(sample()),
+            &GRAVITY_W,
+            DT_S,
+            self.discretisation,
+            &NOISE,
+        );
+    }
+}
+
 fn step<G: InertialState<D>, S: InertialSide, const D: usize>(
     belief: &mut Belief<G, S, D>,
     discretisation: Discretisation,
+    processor: Processor,
 ) {
-    let measured = black_box(sample());
-    propagate_in_place(belief, &measured, &GRAVITY_W, DT_S, discretisation, &NOISE);
+    processor.run(Step {
+        belief,
+        discretisation,
+    });
 }
 
 fn pair<G: InertialState<D>, S: InertialSide, const D: usize>(
@@ -24,17 +48,24 @@ fn pair<G: InertialState<D>, S: InertialSide, const D: usize>(
     start: Belief<G, S, D>,
 ) {
     let zoh = Discretisation::ZeroOrderHold;
+    let processor = Processor::detect();
     let (mut fast, mut plain) = (start, start);
-    step(&mut fast, zoh);
+    step(&mut fast, zoh, Processor::plain());
+    step(&mut plain, zoh, processor);
+    assert_eq!(fast, plain, "wider instructions give other bits");
+    plain = start;
     dense::propagate(&mut plain);
     assert_same(fast.covariance.matrix(), plain.covariance.matrix());
 
     let euler = Discretisation::Euler;
     suite.in_place(&format!("predict/{name}"), start, |belief| {
-        step(belief, zoh);
+        step(belief, zoh, processor);
+    });
+    suite.in_place(&format!("predict/{name}/any processor"), start, |belief| {
+        step(belief, zoh, Processor::plain());
     });
     suite.in_place(&format!("predict/{name}/euler"), start, |belief| {
-        step(belief, euler);
+        step(belief, euler, processor);
     });
     suite.in_place(&format!("predict/{name}/dense"), start, dense::propagate);
 }

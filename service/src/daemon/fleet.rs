@@ -57,7 +57,13 @@ pub fn serve(order: &Order<'_>, ready: impl FnOnce() -> anyhow::Result<()>) -> a
         ready()
     };
     if threads <= 1 {
-        return thread(order, order.instances.iter(), 0, transport::open_node, ready);
+        return thread(
+            order,
+            order.instances.iter(),
+            0,
+            transport::open_node,
+            ready,
+        );
     }
     // Once for all threads, before any of them meets what killed processes left.
     transport::sweep(&transport::config_from_env()?)?;

@@ -237,9 +237,9 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
             & is_within(&pose.velocity, MAX_VELOCITY_MPS)
             & is_within(&mean.gyro_bias(), self.imu.max_gyro)
             & is_within(&mean.accel_bias(), self.imu.max_accel)
-            & variances
-                .iter()
-                .fold(true, |sound, variance| sound & (0.0..=f64::MAX).contains(variance))
+            & variances.iter().fold(true, |sound, variance| {
+                sound & (0.0..=f64::MAX).contains(variance)
+            })
     }
 
     fn fuse(
@@ -330,9 +330,9 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Work for Advance<'_, 
 
 /// Whether no component is larger than `limit`.
 fn is_within(vector: &Vector3<f64>, limit: f64) -> bool {
-    vector
-        .iter()
-        .fold(true, |within, component| within & (component.abs() <= limit))
+    vector.iter().fold(true, |within, component| {
+        within & (component.abs() <= limit)
+    })
 }
 
 /// Every so many fixes of a sender the covariance is looked at, and mended if rounding has made it indefinite: far more

@@ -79,7 +79,9 @@ pub fn snapshot<G: Vehicle<D, N>, const D: usize, const N: usize>(
         p_w_m: position_w.into(),
         ..StateVector::ZERO
     };
-    belief.covariance.write_upper_triangle(&mut state.covariance);
+    belief
+        .covariance
+        .write_upper_triangle(&mut state.covariance);
     state
 }
 
@@ -125,7 +127,9 @@ impl Vehicle<3, 2> for SE2 {
     fn write(belief: &Belief<Self, Left, 3>, report: &Report, message: &mut EstimateSe2) {
         message.theta_rad = belief.mean.rotation.angle_rad();
         message.p_w_m = belief.mean.position.into();
-        belief.covariance.write_upper_triangle(&mut message.covariance);
+        belief
+            .covariance
+            .write_upper_triangle(&mut message.covariance);
         note(report, &mut message.mismatch, &mut message.mismatch_sigma);
     }
 }
@@ -160,7 +164,9 @@ impl Vehicle<6, 3> for SE3 {
     fn write(belief: &Belief<Self, Left, 6>, report: &Report, message: &mut EstimateSe3) {
         message.q_wb = belief.mean.rotation.quaternion_xyzw();
         message.p_w_m = belief.mean.position.into();
-        belief.covariance.write_upper_triangle(&mut message.covariance);
+        belief
+            .covariance
+            .write_upper_triangle(&mut message.covariance);
         note(report, &mut message.mismatch, &mut message.mismatch_sigma);
     }
 }

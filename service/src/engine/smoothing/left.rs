@@ -6,7 +6,6 @@ use inekf::filter::{Belief, Covariance, Left as Side};
 use inekf::model::InertialState;
 use inekf_shared::message::{SMOOTHED_CUT, SmoothedState, Zero};
 
-
 /// A bounded queue: if nobody takes the states, the oldest give way, as they do for a slow reader.
 #[derive(Debug)]
 pub(super) struct Left {

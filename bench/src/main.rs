@@ -10,7 +10,9 @@ use inekf_bench::experiment::section7::{MismatchLaw, Setup};
 use inekf_bench::experiment::{self, Experiment, Prior};
 use inekf_bench::fleet::{self, FleetOptions};
 use inekf_bench::latency::mechanism::{self, Mechanism, Wait};
+use inekf_bench::latency::neighbour::{self, Neighbour};
 use inekf_bench::latency::{LatencyOptions, figure, measure};
+use inekf_bench::wake::{self, WakeOptions};
 use inekf_shared::topic::Instance;
 
 /// Measures the estimation service, and repeats the papers' experiments. Build everything first: `cargo build --release`.
@@ -41,6 +43,11 @@ enum Command {
         #[command(flatten)]
         options: FleetOptions,
     },
+    /// Very many samples to a daemon that sleeps between them: does a wait ever outlast its bound?
+    Wake {
+        #[command(flatten)]
+        options: WakeOptions,
+    },
     /// An experiment of the papers: tables on standard output, CSV files and SVG figures in a folder.
     Experiment {
         /// Which one.
@@ -67,6 +74,9 @@ enum Command {
         #[arg(long, value_enum, value_name = "FORM")]
         prior: Option<Prior>,
     },
+    /// The process that `latency --neighbour` measures beside.
+    #[command(hide = true)]
+    Neighbour,
     /// The partner process of a mechanism.
     #[command(hide = true)]
     Partner {
@@ -113,6 +123,7 @@ In the JSON `ratio_p50` and `ratio_p999` on top are those of the 15-state filter
 both spinning at saturation.
 
   inekf-bench latency --json latency.json --svg latency.svg
+  inekf-bench latency --neighbour --json latency.json               # idle, then beside a busy neighbour
   inekf-bench latency --rounds 1000000 --turns 20 --seconds 10     # a quarter of an hour, for the tails
 ";
 
@@ -166,11 +177,24 @@ fn run(command: Command) -> anyhow::Result<()> {
             std::io::stdout().write_all(report.text().as_bytes())?;
             Ok(())
         }
+        Command::Neighbour => neighbour::live(),
+        Command::Wake { options } => {
+            let report = wake::measure(&options)?;
+            std::io::stdout().write_all(report.text().as_bytes())?;
+            Ok(())
+        }
         Command::Latency { options, json, svg } => {
             let report = measure(&options)?;
+            let mut all = report.json();
             std::io::stdout().write_all(report.text().as_bytes())?;
+            if options.neighbour {
+                let _neighbour = Neighbour::start()?;
+                let beside = measure(&options)?;
+                println!("\nBeside a busy neighbour:\n{}", beside.text());
+                all["beside_a_busy_neighbour"] = beside.json();
+            }
             if let Some(file) = json {
-                write(&file, &serde_json::to_string_pretty(&report.json())?)?;
+                write(&file, &serde_json::to_string_pretty(&all)?)?;
             }
             if let Some(file) = svg {
                 write(&file, &figure::svg(&report)?)?;

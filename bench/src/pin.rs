@@ -15,6 +15,18 @@ pub fn processors() -> anyhow::Result<Vec<usize>> {
         .collect())
 }
 
+/// Lets the calling thread run on any of these again.
+///
+/// # Errors
+/// The system refuses.
+pub fn unpin(processors: &[usize]) -> anyhow::Result<()> {
+    let mut set = CpuSet::new();
+    for cpu in processors {
+        set.set(*cpu);
+    }
+    sched_setaffinity(None, &set).context("undoing the pinning")
+}
+
 /// Pins the calling thread, or the process `pid` before it starts threads of its own.
 ///
 /// # Errors

@@ -16,6 +16,7 @@ pub mod figure;
 pub mod futex;
 pub mod machine;
 pub mod mechanism;
+pub mod neighbour;
 pub mod partner;
 pub mod placement;
 pub mod preemption;
@@ -67,6 +68,10 @@ pub struct LatencyOptions {
     /// below this, ns.
     #[arg(long, default_value_t = 220, value_name = "NS")]
     pub sibling_below_ns: u64,
+    /// Measure everything a second time beside a busy neighbour: a process that streams through memory on every
+    /// processor, at the lowest priority.
+    #[arg(long)]
+    pub neighbour: bool,
 }
 
 impl LatencyOptions {
@@ -118,6 +123,7 @@ pub fn measure(options: &LatencyOptions) -> anyhow::Result<Report> {
         }
     }
     bar.finish_and_clear();
+    pin::unpin(&processors)?;
     machine.finish();
     Ok(Report {
         rows,

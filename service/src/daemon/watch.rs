@@ -3,7 +3,8 @@
 //! Everything here runs once per period, never between a sample and its estimate.
 
 use inekf_shared::message::{
-    Health, STATE_DEGRADED, STATE_RUNNING, STATE_STALE, state_name, waiting_for_name,
+    Health, SOURCES, STATE_DEGRADED, STATE_RUNNING, STATE_STALE, source_index, state_name,
+    waiting_for_name,
 };
 use tracing::{info, warn};
 
@@ -44,6 +45,10 @@ pub struct Watch {
     stale_after_ns: u64,
     next_ns: u64,
     last_arrival_ns: u64,
+    /// When a message of any input was last taken; 0 before the first.
+    last_delivery_ns: u64,
+    /// When one of each source of fixes was.
+    delivered_ns: [u64; SOURCES],
     arrivals_at_last: u64,
     said: (u32, u32),
     failures_said: u64,
@@ -59,6 +64,8 @@ impl Watch {
             stale_after_ns,
             next_ns: now_ns,
             last_arrival_ns: now_ns,
+            last_delivery_ns: 0,
+            delivered_ns: [0; SOURCES],
             arrivals_at_last: arrivals,
             said: (0, 0),
             failures_said: 0,
@@ -69,6 +76,16 @@ impl Watch {
     /// Notes that motion samples arrived at `now_ns`.
     pub fn arrival(&mut self, now_ns: u64) {
         self.last_arrival_ns = now_ns;
+        self.last_delivery_ns = now_ns;
+    }
+
+    /// Notes that a fix of this topic and source was taken at `now_ns`.
+    pub fn delivery(&mut self, input: usize, source: u32, now_ns: u64) {
+        self.last_delivery_ns = now_ns;
+        if let Some(last) = source_index(input, source).and_then(|at| self.delivered_ns.get_mut(at))
+        {
+            *last = now_ns;
+        }
     }
 
     /// Whether a health message is due.
@@ -108,6 +125,10 @@ impl Watch {
             checkpoints: moment.checkpoints,
             checkpoint_failures: moment.checkpoint_failures,
             journal_failures: moment.journal_failures,
+            last_fix_stamp_ns: tally.last_fix_stamp_ns,
+            last_delivery_ns: self.last_delivery_ns,
+            fused_stamp_ns: tally.fused_stamp_ns,
+            delivered_ns: self.delivered_ns,
         }
     }
 

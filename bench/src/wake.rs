@@ -48,6 +48,8 @@ pub struct WakeReport {
     rounds: Histogram<u64>,
     /// Rounds that took longer than a wait may.
     beyond: u64,
+    /// What the daemon counted, and the longest, ns.
+    stalls: (u64, u64),
 }
 
 /// Measures.
@@ -71,6 +73,7 @@ pub fn measure(options: &WakeOptions) -> anyhow::Result<WakeReport> {
         options: *options,
         rounds: histogram()?,
         beyond: 0,
+        stalls: (0, 0),
     };
     let bar = progress("thousands of samples", options.samples / STEP);
     for sample in 0..options.samples {
@@ -86,6 +89,8 @@ pub fn measure(options: &WakeOptions) -> anyhow::Result<WakeReport> {
         }
     }
     bar.finish_and_clear();
+    let health = daemon.health()?;
+    report.stalls = (health.stalls, health.longest_stall_ns);
     Ok(report)
 }
 
@@ -109,9 +114,11 @@ impl WakeReport {
         }
         let _ = writeln!(
             text,
-            "\nlonger than {}  {}",
+            "\nlonger than {}  {}\nstalls counted by the daemon  {} (longest {})",
             format_ns(BOUND_NS as f64),
-            self.beyond
+            self.beyond,
+            self.stalls.0,
+            format_ns(self.stalls.1 as f64),
         );
         text
     }

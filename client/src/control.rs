@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
     CONTROL_BARRIER, CONTROL_CONFIG, CONTROL_OK, CONTROL_PAUSE, CONTROL_RELOAD_NOISE,
     CONTROL_RESET, CONTROL_RESUME, CONTROL_SET_STATE, CONTROL_SMOOTHED, CONTROL_SNAPSHOT,
@@ -9,6 +10,8 @@ use inekf_shared::message::{
 };
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, ControlClient, Node, TransportError, WakeNotifier};
+
+use crate::attach::Attached;
 
 /// A request was not granted.
 #[derive(Debug, thiserror::Error)]
@@ -39,16 +42,34 @@ pub enum ControlError {
     },
 }
 
+/// Name of a controller's node, for people who list the nodes.
+const NODE: &str = "inekf-control";
+
 /// No configuration is longer, bytes.
 const MAX_CONFIG_LEN: usize = 1 << 20;
 
 /// Sends requests and waits for their answers.
+///
+/// If somebody removes the files in shared memory it attaches anew by itself at a later request.
 pub struct Controller {
-    client: ControlClient,
-    wake: WakeNotifier,
+    ports: Attached<Ports>,
     next_id: u64,
     timeout: Duration,
-    _node: Node,
+}
+
+/// What requests go through.
+struct Ports {
+    client: ControlClient,
+    wake: WakeNotifier,
+}
+
+impl Ports {
+    fn open(node: &Node, instance: &Instance) -> Result<Self, TransportError> {
+        Ok(Self {
+            client: transport::control(node, instance)?.client()?,
+            wake: transport::wake(node, instance)?.notifier()?,
+        })
+    }
 }
 
 impl Controller {
@@ -57,7 +78,7 @@ impl Controller {
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
     pub fn open(instance: &Instance, timeout: Duration) -> Result<Self, TransportError> {
-        Self::open_on(transport::open_node("inekf-control")?, instance, timeout)
+        Self::open_on(transport::open_node(NODE)?, instance, timeout)
     }
 
     /// The same on a node of one's own.
@@ -70,11 +91,9 @@ impl Controller {
         timeout: Duration,
     ) -> Result<Self, TransportError> {
         Ok(Self {
-            client: transport::control(&node, instance)?.client()?,
-            wake: transport::wake(&node, instance)?.notifier()?,
+            ports: Attached::open(node, NODE, instance, Ports::open)?,
             next_id: 1,
             timeout,
-            _node: node,
         })
     }
 
@@ -191,18 +210,25 @@ impl Controller {
         let failed = |cause: String| ControlError::Failed { request, cause };
         asked.request_id = self.next_id;
         self.next_id += 1;
-        let pending = self
+        self.ports.look(monotonic_ns());
+        let Some(ports) = self.ports.ports() else {
+            return Err(failed(
+                "its files in shared memory were removed, and cannot be opened again yet"
+                    .to_owned(),
+            ));
+        };
+        let pending = ports
             .client
             .send_copy(asked)
             .map_err(|error| failed(error.to_string()))?;
-        let _ = self.wake.notify();
+        let _ = ports.wake.notify();
         let started = Instant::now();
         loop {
             if let Some(response) = pending
                 .receive()
                 .map_err(|error| failed(error.to_string()))?
             {
-                return if response.status == CONTROL_OK {
+                let answer = if response.status == CONTROL_OK {
                     Ok(*response)
                 } else {
                     Err(ControlError::Refused {
@@ -210,6 +236,8 @@ impl Controller {
                         reason: response.reason().to_owned(),
                     })
                 };
+                self.ports.heard();
+                return answer;
             }
             let waited = started.elapsed();
             if waited > self.timeout {

@@ -13,6 +13,7 @@
 //! Conventions everywhere: SI units and radians, world ENU, body FLU, quaternions Hamilton, body to world, stored
 //! `x, y, z, w`; stamps are `u64` nanoseconds of the sensor clock.
 
+mod attach;
 pub mod consistency;
 pub mod control;
 pub mod daemon;

@@ -352,7 +352,8 @@ fn run_record(arguments: RecordArguments) -> anyhow::Result<()> {
         duration: duration.transpose().context("--duration")?,
     };
     let stop = stopped_by_signal()?;
-    let summary = record(&options, &|| stop.load(Ordering::Relaxed))?;
+    let say = |line: &str| eprintln!("{line}");
+    let summary = record(&options, &|| stop.load(Ordering::Relaxed), &say)?;
     println!(
         "recorded {} entries and {} estimates in {}",
         summary.entries,
@@ -369,6 +370,12 @@ fn run_record(arguments: RecordArguments) -> anyhow::Result<()> {
         println!(
             "missed   {} entries, {} estimates",
             summary.entries_missed, summary.estimates_missed
+        );
+    }
+    if summary.unwritten > 0 {
+        println!(
+            "lost     {} entries and estimates to a disk that had no room",
+            summary.unwritten
         );
     }
     if summary.restarted {

@@ -65,7 +65,7 @@ enum Command {
         #[arg(long)]
         count: Option<u64>,
     },
-    /// Reads estimates, until it is killed: a line for every daemon that it hears.
+    /// Reads estimates, until it is killed: a line for every daemon that it hears, and each time that it attached anew.
     #[command(hide = true)]
     Read {
         #[arg(long)]
@@ -186,11 +186,12 @@ fn feed(instance: &Instance, rate_hz: u32, count: u64) -> Outcome<()> {
 
 fn read(instance: &Instance) -> Outcome<()> {
     let mut reader: EstimateReader = EstimateReader::open(instance)?;
-    let mut last = u64::MAX;
+    let (mut last, mut attached) = (u64::MAX, 0);
     loop {
         while let Some(estimate) = reader.next_estimate()? {
             let number = estimate.head.estimate_seq;
-            if number <= last {
+            if number <= last || reader.reattached() > attached {
+                attached = reader.reattached();
                 println!("a daemon, from estimate {number}");
                 std::io::stdout().flush()?;
             }

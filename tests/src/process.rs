@@ -174,8 +174,13 @@ pub struct Daemon {
 impl Daemon {
     /// Starts a daemon with the text of a configuration and waits until it is ready.
     pub fn start(memory: &Memory, instance: &str, config: &str) -> Self {
+        let command = memory.command(&programs().service);
+        Self::start_as(command, instance, config)
+    }
+
+    /// The same by a command that is, or becomes, the daemon's program with the arguments it is given.
+    pub fn start_as(mut command: Command, instance: &str, config: &str) -> Self {
         let (folder, file) = config_file(config);
-        let mut command = memory.command(&programs().service);
         command.arg("--config").arg(file);
         command.args(["--instance", instance]);
         let mut running = Running::start(command);

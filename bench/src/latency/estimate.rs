@@ -1,5 +1,7 @@
 //! The service: a sample sent to a real daemon, its estimate with full covariance read.
 
+use std::time::Duration;
+
 use anyhow::Context;
 use inekf_client::daemon::{Daemon, private_instance};
 use inekf_client::dataset::{ImuRow, Odometry2dRow, PositionRow};
@@ -9,8 +11,9 @@ use inekf_client::read::EstimateReader;
 use inekf_client::session::Session;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
-    ESTIMATE_PROPAGATED, ESTIMATE_UPDATED, EstimateSe2, EstimateSe23, StateVector,
+    ESTIMATE_PROPAGATED, ESTIMATE_UPDATED, EstimateSe2, EstimateSe23, Health, StateVector,
 };
+use inekf_shared::transport::{self, Subscriber};
 use tempfile::TempDir;
 
 use super::mechanism::Wait;
@@ -40,7 +43,27 @@ pub struct Estimate<E: model::Estimate> {
     stamp_ns: u64,
     inside_ns: u64,
     daemon: Daemon,
+    health: Subscriber<Health>,
     _config: TempDir,
+}
+
+impl<E: model::Estimate> Estimate<E> {
+    /// What the daemon says of itself from now on: it takes about a second.
+    ///
+    /// # Errors
+    /// It does not say anything.
+    pub fn health(&self) -> anyhow::Result<Health> {
+        let asked_ns = monotonic_ns();
+        loop {
+            while let Some(health) = self.health.receive()? {
+                if health.stamp_ns > asked_ns {
+                    return Ok(*health);
+                }
+            }
+            still_patient(asked_ns, "the daemon")?;
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
 }
 
 /// A daemon of the model `imu` on processor `cpu`, with biases (15 states) or without (9),
@@ -141,6 +164,8 @@ impl<E: model::Estimate> Estimate<E> {
         pin::pin(Some(daemon.id()), cpu)?;
         let mut feeder = Feeder::open(&instance)?;
         let reader = EstimateReader::open(&instance)?;
+        let node = transport::open_node("inekf-bench")?;
+        let health = transport::health(&node, &instance)?.subscriber()?;
         let mut session: Session<E> = Session::open(&instance)?;
         for step in 1..=FIRST {
             first(&mut feeder, step * PERIOD_NS)?;
@@ -155,6 +180,7 @@ impl<E: model::Estimate> Estimate<E> {
             stamp_ns: FIRST * PERIOD_NS,
             inside_ns: 0,
             daemon,
+            health,
             _config: folder,
         })
     }

@@ -10,9 +10,10 @@ use std::ptr;
 
 use inekf_client::dataset::{ImuRow, PositionRow, VelocityRow};
 use inekf_client::feed::{Feeder, SendError};
+use inekf_client::read::EstimateReader;
 use inekf_shared::message::EstimateSe23;
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Node, Received, Subscriber};
+use inekf_shared::transport::Received;
 
 thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::default();
@@ -35,8 +36,7 @@ pub extern "C" fn inekf_last_error() -> *const c_char {
 pub struct InekfReader {
     // Before the subscriber: a sample is given back to it.
     held: Option<Received<EstimateSe23>>,
-    estimates: Subscriber<EstimateSe23>,
-    _node: Node,
+    estimates: EstimateReader,
 }
 
 /// Opens a reader.
@@ -47,12 +47,9 @@ pub struct InekfReader {
 pub unsafe extern "C" fn inekf_reader_open(instance: *const c_char) -> *mut InekfReader {
     // SAFETY: the caller's promise is handed on.
     let opened = unsafe { name(instance) }.and_then(|instance| {
-        let node = transport::open_node("inekf-c-reader").map_err(fail).ok()?;
-        let topic = transport::estimate(&node, &instance).map_err(fail).ok()?;
         Some(InekfReader {
             held: None,
-            estimates: topic.subscriber().map_err(fail).ok()?,
-            _node: node,
+            estimates: EstimateReader::open(&instance).map_err(fail).ok()?,
         })
     });
     opened.map_or(ptr::null_mut(), |reader| Box::into_raw(Box::new(reader)))
@@ -74,7 +71,7 @@ pub unsafe extern "C" fn inekf_reader_next(
             reader.held = None;
             reader
                 .estimates
-                .receive()
+                .borrow_next()
                 .map(|sample| match sample {
                     None => ptr::null(),
                     Some(sample) => ptr::from_ref(reader.held.insert(sample).payload()),

@@ -20,12 +20,18 @@ use inekf_shared::message::{
     HeadingFix, ImuSample, Message, Odometry2d, Odometry3d, PositionFix, VelocityFix,
 };
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Node, Outlet, Publisher, TransportError, WakeNotifier};
+use inekf_shared::transport::{
+    self, InputMessage, Node, Outlet, Publisher, TransportError, WakeNotifier,
+};
 
 use super::number::Numbering;
+use crate::attach::Attached;
 use crate::dataset::{
     Event, HeadingRow, ImuRow, Odometry2dRow, Odometry3dRow, PositionRow, VelocityRow,
 };
+
+/// Name of a feeder's node, for people who list the nodes.
+const NODE: &str = "inekf-feeder";
 
 /// A sample could not be sent.
 #[derive(Debug, thiserror::Error)]
@@ -40,8 +46,16 @@ pub struct SendError {
 /// Numbers, stamps and sends samples of every kind to one daemon, and wakes it.
 ///
 /// Every sending method returns the number of daemons that got the sample: 0 if none is there.
-/// Sending never waits.
+/// Sending never waits. If somebody removes the files in shared memory the feeder attaches anew by itself, within half a
+/// second and at the cost of one send that takes as long as opening did; what was sent to nobody meanwhile is lost, and
+/// the daemon counts it.
 pub struct Feeder {
+    ports: Attached<Ports>,
+    numbering: Numbering,
+}
+
+/// What a feeder sends through.
+struct Ports {
     imu: Outlet<ImuSample>,
     odometry2d: Outlet<Odometry2d>,
     odometry3d: Outlet<Odometry3d>,
@@ -49,8 +63,21 @@ pub struct Feeder {
     velocity: Outlet<VelocityFix>,
     heading: Outlet<HeadingFix>,
     wake: WakeNotifier,
-    numbering: Numbering,
-    _node: Node,
+}
+
+impl Ports {
+    fn open(node: &Node, instance: &Instance) -> Result<Self, TransportError> {
+        let inputs = transport::inputs(node, instance)?;
+        Ok(Self {
+            imu: ready(inputs.imu.publisher()?),
+            odometry2d: ready(inputs.odometry2d.publisher()?),
+            odometry3d: ready(inputs.odometry3d.publisher()?),
+            position: ready(inputs.position.publisher()?),
+            velocity: ready(inputs.velocity.publisher()?),
+            heading: ready(inputs.heading.publisher()?),
+            wake: transport::wake(node, instance)?.notifier()?,
+        })
+    }
 }
 
 impl Feeder {
@@ -59,7 +86,7 @@ impl Feeder {
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
     pub fn open(instance: &Instance) -> Result<Self, TransportError> {
-        Self::open_on(transport::open_node("inekf-feeder")?, instance)
+        Self::open_on(transport::open_node(NODE)?, instance)
     }
 
     /// The same on a node of one's own.
@@ -67,18 +94,15 @@ impl Feeder {
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
     pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
-        let inputs = transport::inputs(&node, instance)?;
         Ok(Self {
-            imu: ready(inputs.imu.publisher()?),
-            odometry2d: ready(inputs.odometry2d.publisher()?),
-            odometry3d: ready(inputs.odometry3d.publisher()?),
-            position: ready(inputs.position.publisher()?),
-            velocity: ready(inputs.velocity.publisher()?),
-            heading: ready(inputs.heading.publisher()?),
-            wake: transport::wake(&node, instance)?.notifier()?,
+            ports: Attached::open(node, NODE, instance, Ports::open)?,
             numbering: Numbering::new(monotonic_ns()),
-            _node: node,
         })
+    }
+
+    /// How often it attached anew because its files had been removed.
+    pub fn reattached(&self) -> u64 {
+        self.ports.times()
     }
 
     /// Sends a row of any kind.
@@ -102,7 +126,7 @@ impl Feeder {
     /// [`SendError`].
     pub fn imu(&mut self, row: &ImuRow) -> Result<usize, SendError> {
         let message = self.numbering.imu(row, monotonic_ns());
-        send(&mut self.imu, &self.wake, &message, "imu")
+        send(&mut self.ports, |ports| &mut ports.imu, &message, "imu")
     }
 
     /// Sends a planar odometry increment.
@@ -111,7 +135,12 @@ impl Feeder {
     /// [`SendError`].
     pub fn odometry2d(&mut self, row: &Odometry2dRow) -> Result<usize, SendError> {
         let message = self.numbering.odometry2d(row, monotonic_ns());
-        send(&mut self.odometry2d, &self.wake, &message, "odometry2d")
+        send(
+            &mut self.ports,
+            |ports| &mut ports.odometry2d,
+            &message,
+            "odometry2d",
+        )
     }
 
     /// Sends a spatial odometry increment.
@@ -120,7 +149,12 @@ impl Feeder {
     /// [`SendError`].
     pub fn odometry3d(&mut self, row: &Odometry3dRow) -> Result<usize, SendError> {
         let message = self.numbering.odometry3d(row, monotonic_ns());
-        send(&mut self.odometry3d, &self.wake, &message, "odometry3d")
+        send(
+            &mut self.ports,
+            |ports| &mut ports.odometry3d,
+            &message,
+            "odometry3d",
+        )
     }
 
     /// Sends a position fix.
@@ -129,7 +163,12 @@ impl Feeder {
     /// [`SendError`].
     pub fn position(&mut self, row: &PositionRow) -> Result<usize, SendError> {
         let message = self.numbering.position(row, monotonic_ns());
-        send(&mut self.position, &self.wake, &message, "position")
+        send(
+            &mut self.ports,
+            |ports| &mut ports.position,
+            &message,
+            "position",
+        )
     }
 
     /// Sends a velocity fix.
@@ -138,7 +177,12 @@ impl Feeder {
     /// [`SendError`].
     pub fn velocity(&mut self, row: &VelocityRow) -> Result<usize, SendError> {
         let message = self.numbering.velocity(row, monotonic_ns());
-        send(&mut self.velocity, &self.wake, &message, "velocity")
+        send(
+            &mut self.ports,
+            |ports| &mut ports.velocity,
+            &message,
+            "velocity",
+        )
     }
 
     /// Sends a heading fix.
@@ -147,7 +191,12 @@ impl Feeder {
     /// [`SendError`].
     pub fn heading(&mut self, row: &HeadingRow) -> Result<usize, SendError> {
         let message = self.numbering.heading(row, monotonic_ns());
-        send(&mut self.heading, &self.wake, &message, "heading")
+        send(
+            &mut self.ports,
+            |ports| &mut ports.heading,
+            &message,
+            "heading",
+        )
     }
 }
 
@@ -156,18 +205,25 @@ fn ready<M: Message>(publisher: Publisher<M>) -> Outlet<M> {
     Outlet::new(publisher, 1)
 }
 
-fn send<M: Message>(
-    outlet: &mut Outlet<M>,
-    wake: &WakeNotifier,
+fn send<M: InputMessage>(
+    ports: &mut Attached<Ports>,
+    outlet: impl Fn(&mut Ports) -> &mut Outlet<M>,
     message: &M,
     topic: &'static str,
 ) -> Result<usize, SendError> {
-    let receivers = outlet.send(message).map_err(|error| SendError {
-        topic,
-        cause: error.to_string(),
-    })?;
-    // A daemon that cannot be woken looks by itself within the bound of its wait.
-    let _ = wake.notify();
-    outlet.restock();
+    let mut receivers = 0;
+    if let Some(live) = ports.ports() {
+        let sent = outlet(live).send(message);
+        receivers = sent.map_err(|error| SendError {
+            topic,
+            cause: error.to_string(),
+        })?;
+        // A daemon that cannot be woken looks by itself within the bound of its wait.
+        let _ = live.wake.notify();
+        outlet(live).restock();
+    }
+    if receivers == 0 {
+        ports.look(message.header().sent_ns);
+    }
     Ok(receivers)
 }

@@ -14,14 +14,17 @@ use std::time::{Duration, Instant};
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{EstimateSe2, EstimateSe3, EstimateSe23, Health};
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Node, Subscriber};
+use inekf_shared::transport::{self, Node};
 
 pub use picture::{Picture, Quantity};
 
+use crate::attach::Attached;
 use crate::model::{Estimate, Model};
-use crate::read::EstimateReader;
+use crate::read::{EstimateReader, Listening};
 use crate::session::running_model;
 
+/// Name of a monitor's node, for people who list the nodes.
+const NODE: &str = "inekf-monitor";
 /// How often the queues are drained: the reader's buffer holds a second of estimates at 1 kHz.
 pub const POLL: Duration = Duration::from_millis(50);
 /// The length of a picture.
@@ -50,9 +53,8 @@ pub fn monitor(
 /// Reads what one daemon says of itself, and its estimates.
 pub struct Watcher<E: Estimate> {
     estimates: EstimateReader<E>,
-    health: Subscriber<Health>,
+    health: Listening<Health>,
     picture: Picture,
-    _node: Node,
 }
 
 impl<E: Estimate> Watcher<E> {
@@ -62,7 +64,7 @@ impl<E: Estimate> Watcher<E> {
     /// A port cannot be opened, or the daemon has another model.
     pub fn open(instance: &Instance) -> anyhow::Result<Self> {
         Self::open_on(
-            transport::open_node("inekf-monitor")?,
+            transport::open_node(NODE)?,
             EstimateReader::open(instance)?,
             instance,
         )
@@ -77,11 +79,12 @@ impl<E: Estimate> Watcher<E> {
         estimates: EstimateReader<E>,
         instance: &Instance,
     ) -> anyhow::Result<Self> {
+        let open =
+            |node: &Node, instance: &Instance| transport::health(node, instance)?.subscriber();
         Ok(Self {
-            health: transport::health(&node, instance)?.subscriber()?,
+            health: Listening::new(Attached::open(node, NODE, instance, open)?),
             estimates,
             picture: Picture::new(instance.as_str(), E::KIND)?,
-            _node: node,
         })
     }
 

@@ -1,7 +1,8 @@
 //! A picture in words: one line for logs and pipes, and the lines of each panel of the screen.
 
 use inekf_shared::message::{
-    STATE_ALIGNING, STATE_WAITING, input_name, reason_name, state_name, waiting_for_name,
+    INPUT_HEADING, INPUT_POSITION, MAX_SOURCES, STATE_ALIGNING, STATE_WAITING, input_name,
+    reason_name, source_index, state_name, waiting_for_name,
 };
 
 use super::Picture;
@@ -28,6 +29,7 @@ pub fn line(picture: &Picture) -> String {
         parts.push(format!("nis[{source}] {nis:.2}"));
     }
     parts.push(fixes(picture));
+    parts.extend(sources(picture));
     if !picture.latency.is_empty() {
         parts.push(latency(picture));
     }
@@ -131,7 +133,36 @@ pub fn estimate(picture: &Picture) -> Vec<String> {
     lines
 }
 
-/// Fixes: counters, and the last NIS of each position source.
+/// Each source of fixes that was ever heard of: how old its newest fused fix is, by the sensors' clock, and how long ago
+/// anything came of it, by this machine's.
+#[must_use]
+pub fn sources(picture: &Picture) -> Vec<String> {
+    let Some(health) = picture.health else {
+        return Vec::new();
+    };
+    let since_ns = picture.health_age_ns.unwrap_or(0);
+    let mut lines = Vec::new();
+    for input in INPUT_POSITION..=INPUT_HEADING {
+        for source in 0..MAX_SOURCES as u32 {
+            let Some(at) = source_index(input, source) else {
+                continue;
+            };
+            let Some(heard_ns) = health.delivery_age_ns(health.delivered_ns[at]) else {
+                continue;
+            };
+            let fused = match health.fix_age_ns(health.fused_stamp_ns[at]) {
+                Some(age_ns) => format!("fused {} old", format_ns(age_ns as f64)),
+                None => "none fused".to_owned(),
+            };
+            let heard = format_ns((heard_ns + since_ns) as f64);
+            let name = input_name(input);
+            lines.push(format!("{name} {source}: {fused}, heard {heard} ago"));
+        }
+    }
+    lines
+}
+
+/// Fixes: counters, the last NIS of each position source, and the ages of each source.
 #[must_use]
 pub fn updates(picture: &Picture) -> Vec<String> {
     let mut lines = Vec::new();
@@ -155,6 +186,7 @@ pub fn updates(picture: &Picture) -> Vec<String> {
     for (source, nis) in picture.nis() {
         lines.push(format!("NIS of {source}   {nis:>10.2}"));
     }
+    lines.extend(sources(picture));
     lines
 }
 

@@ -21,7 +21,7 @@ pub use replay::{RerunOptions, RerunSummary, rerun};
 pub use write::Writer;
 
 /// Version of what is in the frames.
-pub const RECORDING_VERSION: u32 = 1;
+pub const RECORDING_VERSION: u32 = 2;
 
 /// What a recording begins with.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -19,6 +19,8 @@ const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 const POLL: Duration = Duration::from_millis(1);
 /// What has been recorded reaches the system this often.
 const FLUSH_EVERY: Duration = Duration::from_millis(100);
+/// While the disk refuses, it is tried this often.
+const RETRY_EVERY: Duration = Duration::from_millis(500);
 
 /// What to record, and where to.
 #[derive(Clone, Debug)]
@@ -44,16 +46,24 @@ pub struct RecordSummary {
     pub estimates: u64,
     /// Estimates that did not come.
     pub estimates_missed: u64,
+    /// Entries and estimates that the disk had no room for.
+    pub unwritten: u64,
     /// Whether it ended because the daemon was started anew.
     pub restarted: bool,
 }
 
 /// Records until `stop` says so, the time is up, or the daemon has been started anew. If the daemon does not run yet, it
-/// is waited for.
+/// is waited for. A disk that refuses while it runs ends nothing: `say` is told so once, and again when it takes what
+/// was kept meanwhile.
 ///
 /// # Errors
-/// The daemon publishes no journal, or the file cannot be written; what was recorded until then is in it.
-pub fn record(options: &RecordOptions, stop: &dyn Fn() -> bool) -> anyhow::Result<RecordSummary> {
+/// The daemon publishes no journal, or the file cannot be begun, or the disk still refuses at the end; what was recorded
+/// until then is in it.
+pub fn record(
+    options: &RecordOptions,
+    stop: &dyn Fn() -> bool,
+    say: &dyn Fn(&str),
+) -> anyhow::Result<RecordSummary> {
     let node = transport::open_node("inekf-record")?;
     // Before the daemon is asked anything: not to miss what it takes meanwhile.
     let topic = transport::journal(&node, &options.instance)?;
@@ -70,9 +80,9 @@ pub fn record(options: &RecordOptions, stop: &dyn Fn() -> bool) -> anyhow::Resul
     };
     let publishes = || topic.publisher_count() > 0;
     match model {
-        Model::Imu => run::<EstimateSe23>(options, &journal, &publishes, stop),
-        Model::Odometry3d => run::<EstimateSe3>(options, &journal, &publishes, stop),
-        Model::Odometry2d => run::<EstimateSe2>(options, &journal, &publishes, stop),
+        Model::Imu => run::<EstimateSe23>(options, &journal, &publishes, stop, say),
+        Model::Odometry3d => run::<EstimateSe3>(options, &journal, &publishes, stop, say),
+        Model::Odometry2d => run::<EstimateSe2>(options, &journal, &publishes, stop, say),
     }
 }
 
@@ -81,6 +91,7 @@ fn run<E: Estimate>(
     journal: &Subscriber<JournalEntry>,
     publishes: &dyn Fn() -> bool,
     stop: &dyn Fn() -> bool,
+    say: &dyn Fn(&str),
 ) -> anyhow::Result<RecordSummary> {
     let mut estimates = EstimateReader::<E>::open(&options.instance)?;
     let mut controller = Controller::open(&options.instance, ANSWER_WITHIN)?;
@@ -110,6 +121,7 @@ fn run<E: Estimate>(
     let mut summary = RecordSummary::default();
     let mut next = None;
     let (started, mut flushed) = (Instant::now(), Instant::now());
+    let mut disk = Disk::default();
     let is_up = || {
         options
             .duration
@@ -140,8 +152,8 @@ fn run<E: Estimate>(
             }
             is_idle = false;
         }
-        if flushed.elapsed() >= FLUSH_EVERY {
-            writer.flush().with_context(place)?;
+        if flushed.elapsed() >= disk.next_try() {
+            disk.took(writer.flush(), writer.given_up(), &place(), say);
             flushed = Instant::now();
         }
         if ends || summary.restarted {
@@ -152,6 +164,47 @@ fn run<E: Estimate>(
         }
     }
     summary.estimates_missed = estimates.missed();
-    writer.finish().with_context(place)?;
+    summary.unwritten = writer.given_up();
+    writer
+        .finish()
+        .with_context(|| format!("{}: the end of the recording is lost", place()))?;
     Ok(summary)
+}
+
+/// How the disk has been, so that a change is said once.
+#[derive(Debug, Default)]
+struct Disk {
+    refuses: bool,
+}
+
+impl Disk {
+    fn next_try(&self) -> Duration {
+        if self.refuses {
+            RETRY_EVERY
+        } else {
+            FLUSH_EVERY
+        }
+    }
+
+    fn took(
+        &mut self,
+        outcome: std::io::Result<()>,
+        given_up: u64,
+        place: &str,
+        say: &dyn Fn(&str),
+    ) {
+        match outcome {
+            Ok(()) if core::mem::take(&mut self.refuses) => {
+                say(&format!(
+                    "{place}: is written again; {given_up} entries and estimates are missing in all"
+                ));
+            }
+            Err(error) if !core::mem::replace(&mut self.refuses, true) => {
+                say(&format!(
+                    "{place}: cannot be written: {error}; what comes is kept in memory for some seconds, and tried again"
+                ));
+            }
+            Ok(()) | Err(_) => {}
+        }
+    }
 }

@@ -1,7 +1,8 @@
 //! From a recording through a daemon of its own: every estimate must come again, bit for bit.
 //!
-//! The daemon is started with the recorded configuration, and given the entries one by one, in their order, by requests
-//! (`inekf-service --stepped`): nothing depends on when a message comes. Only the latency stamps `received_ns` and
+//! The daemon is started with the recorded configuration, and given the entries in their order (`inekf-service
+//! --stepped`): inputs as a journal, some hundred at a time, of which the daemon has taken each when it answers a request;
+//! requests as what they are. Nothing depends on when a message comes. Only the latency stamps `received_ns` and
 //! `published_ns` are not compared.
 //!
 //! A recording from the daemon's first entry on determines everything. One that begins later, or has a gap, determines
@@ -17,10 +18,11 @@ use anyhow::{Context, bail};
 use inekf_shared::message::{
     CONTROL_RESET, CONTROL_SET_STATE, CONTROL_TAKE, ControlRequest, Counters, ESTIMATE_RESET,
     ESTIMATE_RESUMED, EstimateSe2, EstimateSe3, EstimateSe23, JOURNAL_CONTROL, JOURNAL_IMU,
-    JOURNAL_ODOMETRY_2D, JOURNAL_ODOMETRY_3D, JOURNAL_RESUME, MAX_INPUT_LEN, MAX_SOURCES, Message,
+    JOURNAL_ODOMETRY_2D, JOURNAL_ODOMETRY_3D, JOURNAL_RESUME, JournalEntry, MAX_SOURCES, Message,
     StateVector, Zero,
 };
 use inekf_shared::topic::Instance;
+use inekf_shared::transport::{self, Node, Outlet};
 
 use super::read::{Damage, Item, Reader};
 use super::{Entry, Head};
@@ -30,8 +32,10 @@ use crate::model::{Estimate, Model};
 use crate::read::EstimateReader;
 use crate::replay::Output;
 
-/// How long the daemon may take for one entry.
-const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+/// How long the daemon may take for the entries of one time.
+const ANSWER_WITHIN: Duration = Duration::from_secs(30);
+/// Inputs that are given to the daemon at a time. Each may give a few estimates, and the reader's buffer holds 1024.
+const AT_A_TIME: usize = 256;
 /// Samples after which what the engine keeps of them does not depend on those before: the time that a row of odometry
 /// speaks for is bounded by that of the row before.
 const SAMPLES_KEPT: u64 = 2;
@@ -94,73 +98,126 @@ pub fn rerun(options: &RerunOptions) -> anyhow::Result<RerunSummary> {
 }
 
 fn run<E: Estimate>(options: &RerunOptions, instance: &Instance) -> anyhow::Result<RerunSummary> {
-    let mut daemon = Stepped::<E>::open(instance)?;
+    let mut rerun = Rerun::<E> {
+        daemon: Stepped::open(instance)?,
+        recorded: Recorded::open(options)?,
+        output: Output::new(&options.out, options.covariance)?,
+        summary: RerunSummary::default(),
+        trust: Trust::Nothing { samples: 0 },
+    };
     let mut entries = Reader::open(&options.recording)?;
-    let mut recorded = Recorded::<E>::open(options)?;
-    let mut output = Output::new(&options.out, options.covariance)?;
-    let mut summary = RerunSummary::default();
-    let mut trust = Trust::Nothing { samples: 0 };
+    let mut waiting = Vec::with_capacity(AT_A_TIME);
     let mut next = None;
     while let Some(item) = entries.next_item::<E>().context("reading the recording")? {
         let Item::Entry(entry) = item else { continue };
         match next {
             None if entry.index == 0 => {
-                trust = Trust::Everything;
-                summary.whole = true;
+                rerun.trust = Trust::Everything;
+                rerun.summary.whole = true;
             }
             None => {}
             Some(expected) if entry.index == expected => {}
             Some(expected) if entry.index > expected => {
-                summary.gaps.push((expected - 1, entry.index - expected));
-                trust = Trust::Nothing { samples: 0 };
+                rerun.take(&mut waiting)?;
+                let gap = (expected - 1, entry.index - expected);
+                rerun.summary.gaps.push(gap);
+                rerun.trust = Trust::Nothing { samples: 0 };
             }
             Some(_) => bail!("the recording is of more than one life of a daemon"),
         }
         next = Some(entry.index + 1);
-        summary.entries += 1;
-        let (estimates, done) = daemon.take(&entry)?;
-        let was = trust;
-        trust = trust.after(&entry, done, daemon.published);
-        if !was.compares() {
-            summary.skipped += 1;
-            continue;
-        }
-        for estimate in &estimates {
-            output.take(estimate)?;
-            let seq = trust.recorded_seq(estimate.head().estimate_seq);
-            match recorded.find(seq)? {
-                None => summary.unrecorded += 1,
-                Some(theirs) if trust.comparable(estimate) == trust.comparable(&theirs) => {
-                    summary.equal += 1;
-                }
-                Some(theirs) => {
-                    summary.difference = Some(format!(
-                        "the estimate {seq} differs, at {} ns, after entry {}: {}",
-                        theirs.head().stamp_ns,
-                        entry.index,
-                        where_apart(&trust.comparable(&theirs), &trust.comparable(estimate)),
-                    ));
-                }
-            }
-            if summary.difference.is_some() {
-                break;
+        if is_alone(&entry) {
+            rerun.take(&mut waiting)?;
+            waiting.push(entry);
+            rerun.take(&mut waiting)?;
+        } else {
+            waiting.push(entry);
+            if waiting.len() == AT_A_TIME {
+                rerun.take(&mut waiting)?;
             }
         }
-        if summary.difference.is_none() && trust.recorded_seq(daemon.published) != entry.estimates {
-            summary.difference = Some(format!(
-                "after entry {} there were {} estimates, now there are {}",
-                entry.index,
-                entry.estimates,
-                trust.recorded_seq(daemon.published),
-            ));
-        }
-        if summary.difference.is_some() {
+        if rerun.summary.difference.is_some() {
             break;
         }
     }
+    rerun.take(&mut waiting)?;
+    let mut summary = rerun.summary;
     summary.damage = entries.damage();
-    summary.rows = output.finish()?;
+    summary.rows = rerun.output.finish()?;
     Ok(summary)
+}
+
+/// Whether an entry is given to the daemon by a request of its own, because the answer counts.
+fn is_alone(entry: &Entry) -> bool {
+    matches!(entry.kind, JOURNAL_CONTROL | JOURNAL_RESUME)
+}
+
+/// A replay under way.
+struct Rerun<E: Estimate> {
+    daemon: Stepped<E>,
+    recorded: Recorded<E>,
+    output: Output<E>,
+    summary: RerunSummary,
+    trust: Trust,
+}
+
+impl<E: Estimate> Rerun<E> {
+    /// Gives the daemon the entries, which are inputs or one that is alone, and compares what comes of them. Does nothing
+    /// once a difference has been found.
+    fn take(&mut self, entries: &mut Vec<Entry>) -> anyhow::Result<()> {
+        let taken = core::mem::take(entries);
+        let Some(last) = taken.last().filter(|_| self.summary.difference.is_none()) else {
+            return Ok(());
+        };
+        self.summary.entries += taken.len() as u64;
+        let (estimates, done) = self.daemon.take(&taken)?;
+        let was = self.trust;
+        for entry in &taken {
+            self.trust = self.trust.after(entry, done, self.daemon.published);
+        }
+        if !was.compares() {
+            self.summary.skipped += taken.len() as u64;
+            return Ok(());
+        }
+        for estimate in &estimates {
+            self.output.take(estimate)?;
+            self.summary.difference = self.compare(estimate, &taken)?;
+            if self.summary.difference.is_some() {
+                return Ok(());
+            }
+        }
+        let published = self.trust.recorded_seq(self.daemon.published);
+        if published != last.estimates {
+            self.summary.difference = Some(format!(
+                "after entry {} there were {} estimates, now there are {published}",
+                last.index, last.estimates,
+            ));
+        }
+        Ok(())
+    }
+
+    /// What is different about an estimate that came of some of these entries.
+    fn compare(&mut self, estimate: &E, entries: &[Entry]) -> anyhow::Result<Option<String>> {
+        let trust = self.trust;
+        let seq = trust.recorded_seq(estimate.head().estimate_seq);
+        let Some(theirs) = self.recorded.find(seq)? else {
+            self.summary.unrecorded += 1;
+            return Ok(None);
+        };
+        let (was, is) = (trust.comparable(&theirs), trust.comparable(estimate));
+        if was == is {
+            self.summary.equal += 1;
+            return Ok(None);
+        }
+        // Entries say how many estimates there had been when they were done with.
+        let of = entries.iter().find(|entry| entry.estimates >= seq);
+        Ok(Some(format!(
+            "the estimate {seq} differs, at {} ns, after entry {}: {}",
+            theirs.head().stamp_ns,
+            of.or(entries.last()).map_or(0, |entry| entry.index),
+            where_apart(&was, &is),
+        )))
+    }
 }
 
 /// How far what is known determines the estimates.
@@ -248,38 +305,37 @@ fn where_apart(recorded: &[u8], now: &[u8]) -> String {
     )
 }
 
-/// A daemon that is fed by requests.
+/// A daemon that is fed entry by entry.
 struct Stepped<E: Estimate> {
     controller: Controller,
     reader: EstimateReader<E>,
+    entries: Outlet<JournalEntry>,
     /// The number of its last estimate.
     published: u64,
+    _node: Node,
 }
 
 impl<E: Estimate> Stepped<E> {
     fn open(instance: &Instance) -> anyhow::Result<Self> {
         let reader = EstimateReader::open(instance)?;
         let mut controller = Controller::open(instance, ANSWER_WITHIN)?;
+        let node = transport::open_node("inekf-rerun")?;
+        let entries = Outlet::new(transport::journal(&node, instance)?.publisher()?, 1);
         controller.barrier()?;
         Ok(Self {
             controller,
             reader,
+            entries,
             published: 0,
+            _node: node,
         })
     }
 
-    /// Gives the daemon an entry. What came of it, and whether it was not refused.
-    fn take(&mut self, entry: &Entry) -> anyhow::Result<(Vec<E>, bool)> {
-        let answer = match request_of(entry) {
-            // It was refused then.
-            Some(request) if request.kind == CONTROL_TAKE => return Ok((Vec::new(), false)),
-            Some(request) => self.controller.send(request),
-            None => self.controller.send(as_request(entry)?),
-        };
-        let done = match answer {
-            Ok(_) => true,
-            Err(ControlError::Refused { .. }) if entry.kind == JOURNAL_CONTROL => false,
-            Err(error) => return Err(error).context(format!("replaying entry {}", entry.index)),
+    /// Gives the daemon inputs, or one entry that is alone. What came of them, and whether it was not refused.
+    fn take(&mut self, entries: &[Entry]) -> anyhow::Result<(Vec<E>, bool)> {
+        let done = match entries {
+            [alone] if is_alone(alone) => self.ask(alone)?,
+            inputs => self.give(inputs).map(|()| true)?,
         };
         let mut estimates = Vec::new();
         while let Some(estimate) = self.reader.next_estimate()? {
@@ -291,25 +347,48 @@ impl<E: Estimate> Stepped<E> {
         }
         Ok((estimates, done))
     }
+
+    /// Sends inputs one after the other, and waits until all have been taken.
+    fn give(&mut self, inputs: &[Entry]) -> anyhow::Result<()> {
+        for entry in inputs {
+            let message = JournalEntry::new(entry.index, 0, entry.kind, &entry.message);
+            if self.entries.send(&message)? == 0 {
+                bail!("the daemon has gone: it no longer listens");
+            }
+            self.entries.restock();
+        }
+        let first = inputs.first().map_or(0, |entry| entry.index);
+        self.controller
+            .barrier()
+            .with_context(|| format!("replaying {} entries from {first} on", inputs.len()))?;
+        Ok(())
+    }
+
+    /// Hands over a request, or the state of a checkpoint, and says whether it was not refused.
+    fn ask(&mut self, entry: &Entry) -> anyhow::Result<bool> {
+        let answer = match request_of(entry) {
+            // It was refused then.
+            Some(request) if request.kind == CONTROL_TAKE => return Ok(false),
+            Some(request) => self.controller.send(request),
+            None => self.controller.send(as_request(entry)?),
+        };
+        match answer {
+            Ok(_) => Ok(true),
+            Err(ControlError::Refused { .. }) if entry.kind == JOURNAL_CONTROL => Ok(false),
+            Err(error) => Err(error).context(format!("replaying entry {}", entry.index)),
+        }
+    }
 }
 
-/// The request that has the daemon take an entry.
+/// The request that has the daemon begin with the state of a checkpoint.
 fn as_request(entry: &Entry) -> anyhow::Result<ControlRequest> {
-    let mut request = ControlRequest {
+    let state = StateVector::from_bytes(&entry.message);
+    Ok(ControlRequest {
         kind: CONTROL_TAKE,
         argument: entry.kind,
+        state: state.with_context(|| format!("entry {} is no state", entry.index))?,
         ..ControlRequest::ZERO
-    };
-    let len = entry.message.len();
-    if entry.kind == JOURNAL_RESUME {
-        request.state = StateVector::from_bytes(&entry.message)
-            .with_context(|| format!("entry {} is no state", entry.index))?;
-    } else if len <= MAX_INPUT_LEN {
-        request.input[..len].copy_from_slice(&entry.message);
-    } else {
-        bail!("entry {} is longer than any input", entry.index);
-    }
-    Ok(request)
+    })
 }
 
 /// The recorded estimates, in their order.

@@ -1,7 +1,12 @@
 //! The file of a recording as it grows.
+//!
+//! Frames are gathered and handed to the system whole. If the disk refuses (it is full, or has become read-only) the
+//! file is cut back to its last whole frame, and what was gathered is kept, up to a limit, for the next try: a disk that
+//! has room again in time costs nothing, one that has not costs frames, which are counted. The numbers of entries and
+//! estimates then show the gap.
 
-use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use inekf_shared::codec::{self, FRAME_ENTRY, FRAME_ESTIMATE, FRAME_RECORDING};
@@ -10,49 +15,89 @@ use serde::Serialize;
 
 use super::{Entry, Head};
 
+/// So much is gathered before it is handed to the system without being asked, bytes.
+const GATHERED: usize = 64 * 1024;
+/// So much is kept while the disk refuses, bytes: some ten seconds at 500 samples a second.
+const KEPT: usize = 8 * 1024 * 1024;
+
 /// Appends frames to a new file.
 #[derive(Debug)]
 pub struct Writer {
-    file: BufWriter<File>,
+    file: File,
+    /// Bytes of the file that are whole frames.
+    written: u64,
+    /// Whole frames that are not in the file yet.
+    gathered: Vec<u8>,
+    /// Frames that were given up.
+    given_up: u64,
+    /// Whether the last try failed.
+    fails: bool,
 }
 
 impl Writer {
     /// Creates the file, which must not be there: nothing that was recorded is ever overwritten.
     ///
     /// # Errors
-    /// As the system says.
+    /// As the system says; there is then no file.
     pub fn create(path: &Path, head: &Head) -> io::Result<Self> {
         let file = OpenOptions::new().write(true).create_new(true).open(path)?;
         let mut writer = Self {
-            file: BufWriter::new(file),
+            file,
+            written: 0,
+            gathered: Vec::new(),
+            given_up: 0,
+            fails: false,
         };
-        writer.append(FRAME_RECORDING, head)?;
-        writer.flush()?;
+        let begun = writer
+            .append(FRAME_RECORDING, head)
+            .and_then(|()| writer.flush());
+        if let Err(error) = begun {
+            // Half a head is in the way of the next try, and nothing else.
+            let _ = fs::remove_file(path);
+            return Err(error);
+        }
         Ok(writer)
     }
 
-    /// Appends an entry of the journal.
+    /// Appends an entry of the journal. What the disk refuses is kept or counted; [`Writer::flush`] says so.
     ///
     /// # Errors
-    /// As the system says.
+    /// It cannot be encoded.
     pub fn entry(&mut self, entry: &JournalEntry) -> io::Result<()> {
         self.append(FRAME_ENTRY, &Entry::of(entry))
     }
 
-    /// Appends an estimate.
+    /// Appends an estimate, in the same way.
     ///
     /// # Errors
-    /// As the system says.
+    /// It cannot be encoded.
     pub fn estimate<E: EstimateMessage>(&mut self, estimate: &E) -> io::Result<()> {
         self.append(FRAME_ESTIMATE, estimate)
     }
 
-    /// Hands what is buffered to the system.
+    /// Hands what was gathered to the system.
     ///
     /// # Errors
-    /// As the system says.
+    /// As the system says; what was gathered is kept, and the file ends with a whole frame.
     pub fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
+        let written = self.file.write_all(&self.gathered);
+        self.fails = written.is_err();
+        if let Err(error) = written {
+            self.written = match self.file.set_len(self.written) {
+                Ok(()) => self.file.seek(SeekFrom::Start(self.written))?,
+                // What cannot be cut off is read as damage, and costs no other frame.
+                Err(_) => self.file.stream_position()?,
+            };
+            return Err(error);
+        }
+        self.written += self.gathered.len() as u64;
+        self.gathered.clear();
+        Ok(())
+    }
+
+    /// Frames that were given up because the disk refused for too long.
+    pub fn given_up(&self) -> u64 {
+        self.given_up
     }
 
     /// Hands everything to the disk, and ends the recording.
@@ -61,11 +106,57 @@ impl Writer {
     /// As the system says.
     pub fn finish(mut self) -> io::Result<()> {
         self.flush()?;
-        self.file.get_ref().sync_all()
+        self.file.sync_all()
     }
 
     fn append<T: Serialize>(&mut self, kind: u32, value: &T) -> io::Result<()> {
         let frame = codec::encode(kind, value).map_err(io::Error::other)?;
-        self.file.write_all(&frame)
+        if self.gathered.len() + frame.len() > KEPT {
+            self.given_up += 1;
+            return Ok(());
+        }
+        self.gathered.extend_from_slice(&frame);
+        if self.gathered.len() >= GATHERED && !self.fails {
+            // Said by the next flush, which is soon.
+            let _ = self.flush();
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::RECORDING_VERSION;
+
+    /// A writer on a device that is always full.
+    #[test]
+    fn what_a_full_disk_refuses_is_kept_up_to_a_limit_and_then_counted() {
+        let file = OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut writer = Writer {
+            file,
+            written: 0,
+            gathered: Vec::new(),
+            given_up: 0,
+            fails: false,
+        };
+        let head = Head {
+            version: RECORDING_VERSION,
+            model: 1,
+            instance: "car".to_owned(),
+            began_unix_s: 0,
+            config: "x".repeat(1 << 20),
+        };
+        for _ in 0..7 {
+            writer.append(FRAME_RECORDING, &head).unwrap();
+            assert!(writer.flush().is_err());
+        }
+        assert_eq!((writer.written, writer.given_up()), (0, 0));
+        assert!(writer.gathered.len() > 7 << 20);
+        writer.append(FRAME_RECORDING, &head).unwrap();
+        writer.append(FRAME_RECORDING, &head).unwrap();
+        assert_eq!(writer.given_up(), 2);
+        assert!(writer.gathered.len() <= KEPT);
+        assert!(writer.finish().is_err());
     }
 }

@@ -8,8 +8,8 @@ use inekf_client::monitor::{Picture, screen, text};
 use inekf_client::report::{Material, NisSample, build};
 use inekf_client::rows::row;
 use inekf_shared::message::{
-    ESTIMATE_PROPAGATED, EstimateHead, EstimateSe23, Health, STATE_RUNNING, STATE_WAITING,
-    WAITING_FOR_POSITION, Zero, triangle_index,
+    ESTIMATE_PROPAGATED, EstimateHead, EstimateSe23, Health, INPUT_HEADING, INPUT_POSITION,
+    STATE_RUNNING, STATE_WAITING, WAITING_FOR_POSITION, Zero, source_index, triangle_index,
 };
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -63,6 +63,13 @@ fn the_screen_shows_state_uncertainty_nis_and_latency() {
         ..Health::ZERO
     };
     health.counters.gated = 17;
+    // Source 2 of the positions: heard of 30 ms before the message, which is 100 ms old; its newest fused fix is half a
+    // second old by the sensors' clock. Source 1 of the headings was heard of, and never believed.
+    health.last_imu_stamp_ns = 9_000_000_000;
+    let of = |input, source| source_index(input, source).unwrap();
+    health.delivered_ns[of(INPUT_POSITION, 2)] = 1_970_000_000;
+    health.fused_stamp_ns[of(INPUT_POSITION, 2)] = 8_500_000_000;
+    health.delivered_ns[of(INPUT_HEADING, 1)] = 1_000_000_000;
     picture.begin();
     picture.take_health(&health);
     for stamp_ns in 1..=100 {
@@ -83,6 +90,8 @@ fn the_screen_shows_state_uncertainty_nis_and_latency() {
         "3.25",
         "gated              17",
         "p50 7 µs",
+        "position 2: fused 500 ms old, heard 130 ms ago",
+        "heading 1: none fused, heard 1.1 s ago",
     ] {
         assert!(screen.contains(word), "{word}:\n{screen}");
     }

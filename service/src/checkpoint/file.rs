@@ -9,12 +9,12 @@ use std::io::{self, Read, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
-use inekf_shared::codec::{self, CodecError, FRAME_CHECKPOINT};
+use inekf_shared::codec::{self, CodecError, FRAME_CHECKPOINT, FRAME_HEADER_LEN};
 use inekf_shared::message::{StateVector, model_name};
 use serde::{Deserialize, Serialize};
 
 /// Version of what is in the frame.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// No checkpoint has as many bytes.
 const MAX_BYTES: u64 = 64 * 1024;
 
@@ -29,6 +29,9 @@ pub struct Identity {
     pub model: u32,
     /// Dimension of the state's error.
     pub dimension: u32,
+    /// What is taken to be wrong with the inputs, and how it is treated: what the learned parameters mean. Empty if
+    /// nothing is.
+    pub mismatches: String,
 }
 
 /// What the frame holds.
@@ -70,11 +73,15 @@ pub enum Unusable {
 impl Identity {
     fn in_words(&self) -> String {
         format!(
-            "instance {}, model {}, estimator {}, {} states",
+            "instance {}, model {}, estimator {}, {} states, mismatches: {}",
             self.instance,
             model_name(self.model),
             self.estimator,
-            self.dimension
+            self.dimension,
+            match self.mismatches.as_str() {
+                "" => "none",
+                mismatches => mismatches,
+            }
         )
     }
 }
@@ -101,7 +108,16 @@ pub fn decode(identity: &Identity, bytes: &[u8]) -> Result<StateVector, Unusable
         version,
         identity: found,
         state,
-    } = codec::decode(FRAME_CHECKPOINT, bytes)?;
+    } = match codec::decode(FRAME_CHECKPOINT, bytes) {
+        // The bytes are whole, and mean something else: the version, which comes first in all of them, says so.
+        Err(error @ (CodecError::Malformed { .. } | CodecError::Trailing { .. })) => {
+            return Err(match version_of(bytes) {
+                Some(version) if version != VERSION => Unusable::OtherVersion(version),
+                _ => error.into(),
+            });
+        }
+        decoded => decoded?,
+    };
     if version != VERSION {
         return Err(Unusable::OtherVersion(version));
     }
@@ -113,6 +129,12 @@ pub fn decode(identity: &Identity, bytes: &[u8]) -> Result<StateVector, Unusable
         });
     }
     Ok(state)
+}
+
+/// The version of what is in a frame, which a payload of any version begins with.
+fn version_of(frame: &[u8]) -> Option<u32> {
+    let version = frame.get(FRAME_HEADER_LEN..FRAME_HEADER_LEN + 4)?;
+    Some(u32::from_le_bytes(version.try_into().ok()?))
 }
 
 /// The state in the file at `path`; `None` if there is no such file.
@@ -201,6 +223,7 @@ mod tests {
             estimator: "inekf".to_owned(),
             model: MODEL_IMU,
             dimension: 15,
+            mismatches: String::new(),
         }
     }
 
@@ -277,11 +300,17 @@ mod tests {
                 dimension: 9,
                 ..identity()
             },
+            Identity {
+                mismatches: "augmented: odometry scale".to_owned(),
+                ..identity()
+            },
         ];
         for other in others {
             let text = decode(&other, &bytes).unwrap_err().to_string();
             assert!(
-                text.contains("instance car, model imu, estimator inekf, 15 states"),
+                text.contains(
+                    "instance car, model imu, estimator inekf, 15 states, mismatches: none"
+                ),
                 "{text}"
             );
             assert!(text.contains(&other.in_words()), "{text}");
@@ -296,6 +325,36 @@ mod tests {
             decode(&identity(), &bytes),
             Err(Unusable::Foreign { .. })
         ));
+    }
+
+    #[test]
+    fn what_an_older_version_wrote_is_refused_by_its_number() {
+        /// A checkpoint before it had what was learned.
+        #[derive(Serialize)]
+        struct Before {
+            version: u32,
+            instance: String,
+            estimator: String,
+            model: u32,
+            dimension: u32,
+            state: Vec<f64>,
+        }
+        for version in [1, 3] {
+            let before = Before {
+                version,
+                instance: "car".to_owned(),
+                estimator: "inekf".to_owned(),
+                model: MODEL_IMU,
+                dimension: 15,
+                state: vec![0.5; 140],
+            };
+            let bytes = codec::encode(FRAME_CHECKPOINT, &before).unwrap();
+            let text = decode(&identity(), &bytes).unwrap_err().to_string();
+            assert_eq!(
+                text,
+                format!("it has version {version}, this program reads version 2")
+            );
+        }
     }
 
     #[test]

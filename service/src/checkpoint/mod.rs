@@ -216,6 +216,7 @@ mod tests {
             estimator: "inekf".to_owned(),
             model: MODEL_IMU,
             dimension: 9,
+            mismatches: String::new(),
         }
     }
 

@@ -52,7 +52,36 @@ pub enum Wrong {
     },
 }
 
+/// What the parameters are that a filter learns beside the pose; empty if it learns none.
+pub fn learned_in_words(mismatch: Mismatch, mismatched: &[Mismatched]) -> String {
+    match mismatch {
+        Mismatch::Consider | Mismatch::Augmented | Mismatch::Adaptive => {
+            let whats: Vec<String> = mismatched.iter().map(|one| one.what.in_words()).collect();
+            format!("{mismatch}: {}", whats.join(", "))
+        }
+        Mismatch::None | Mismatch::Hard | Mismatch::Soft => String::new(),
+    }
+}
+
 impl Wrong {
+    fn in_words(self) -> String {
+        match self {
+            Self::OdometryScale => "scale of the odometry".to_owned(),
+            Self::OdometryTurnScale => "scale of the odometry's turns".to_owned(),
+            Self::OdometryRotationBias { axis } => {
+                format!("bias of the odometry's turns about {axis}")
+            }
+            Self::MeasurementScale { source } => format!("scale of source {source}"),
+            Self::MeasurementRotation { source, axis: None } => {
+                format!("rotation of source {source}")
+            }
+            Self::MeasurementRotation {
+                source,
+                axis: Some(axis),
+            } => format!("rotation of source {source} about {axis}"),
+        }
+    }
+
     /// How many parameters it has.
     pub const fn parameters(self) -> usize {
         match self {

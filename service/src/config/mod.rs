@@ -61,7 +61,7 @@ pub use imu::Imu;
 pub use initial::Initial;
 pub use keeping::{Checkpoint, Journal};
 pub use load::MAX_FILE_BYTES;
-pub use mismatched::{Mismatched, Wrong};
+pub use mismatched::{Mismatched, Wrong, learned_in_words};
 pub use motion::{Inertial, Motion, Odometry};
 pub use noise::{IncrementNoise, InertialNoise, OdometryNoise, RowSigmas, WhiteNoise};
 pub use odometry::Rows;

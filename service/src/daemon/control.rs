@@ -51,7 +51,13 @@ pub fn answer<M: Model, H: History<M>>(
             Ok(nothing)
         }
         CONTROL_RELOAD_NOISE => engine.reload_noise(&request.noise).map(|()| nothing),
-        CONTROL_TAKE if terms.stepped => take(engine, request, terms, estimates).map(|()| nothing),
+        CONTROL_TAKE if terms.stepped => {
+            let message = match request.argument {
+                JOURNAL_RESUME => request.state.as_bytes(),
+                _ => &request.input,
+            };
+            take(engine, request.argument, message, terms, estimates).map(|()| nothing)
+        }
         CONTROL_TAKE => Err(
             "this daemon takes its inputs from their topics: start one with --stepped to feed it by requests",
         ),
@@ -83,40 +89,44 @@ pub fn answer<M: Model, H: History<M>>(
     response
 }
 
-/// Gives the engine the entry of a journal that `request` holds.
-fn take<M: Model, H: History<M>>(
+/// Gives the engine an entry of a journal: its kind, and the bytes that its message is at the front of.
+///
+/// # Errors
+/// A sentence that says why it is no entry; the engine has then not taken it.
+pub fn take<M: Model, H: History<M>>(
     engine: &mut Engine<M, H>,
-    request: &ControlRequest,
+    kind: u32,
+    message: &[u8],
     terms: &Terms<'_>,
     estimates: &mut impl Outbox<M::Estimate>,
 ) -> Result<(), &'static str> {
-    match request.argument {
-        kind @ (JOURNAL_IMU | JOURNAL_ODOMETRY_2D | JOURNAL_ODOMETRY_3D) => {
+    match kind {
+        JOURNAL_IMU | JOURNAL_ODOMETRY_2D | JOURNAL_ODOMETRY_3D => {
             let input = kind as usize - 1;
             if input == M::INPUT {
-                engine.sample(&input_of(request)?, monotonic_ns(), estimates);
+                engine.sample(&front(message)?, monotonic_ns(), estimates);
             } else {
-                let header: Header = input_of(request)?;
+                let header: Header = front(message)?;
                 engine.refuse(input, &header, Refusal(REASON_WRONG_MODEL));
             }
         }
-        JOURNAL_POSITION => engine.position(&input_of(request)?, estimates),
-        JOURNAL_VELOCITY => engine.velocity(&input_of(request)?, estimates),
-        JOURNAL_HEADING => engine.heading(&input_of(request)?, estimates),
+        JOURNAL_POSITION => engine.position(&front(message)?, estimates),
+        JOURNAL_VELOCITY => engine.velocity(&front(message)?, estimates),
+        JOURNAL_HEADING => engine.heading(&front(message)?, estimates),
         JOURNAL_SETTLE => engine.settle(estimates),
         JOURNAL_RESUME => {
             let settings = ResumeSettings::new(&terms.config.checkpoint);
-            engine.resume_from(&request.state, settings)?;
+            engine.resume_from(&front(message)?, settings)?;
         }
         _ => return Err("the kind of the entry is unknown to this version"),
     }
     Ok(())
 }
 
-/// The message at the front of the request's bytes.
-fn input_of<T: Message>(request: &ControlRequest) -> Result<T, &'static str> {
-    let front = request.input.get(..size_of::<T>());
+/// The message at the front of `bytes`.
+fn front<T: Message>(bytes: &[u8]) -> Result<T, &'static str> {
+    let front = bytes.get(..size_of::<T>());
     front
         .and_then(T::from_bytes)
-        .ok_or("the message is longer than a request holds")
+        .ok_or("the entry is shorter than its message")
 }

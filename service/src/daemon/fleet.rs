@@ -20,7 +20,7 @@ use super::run::{Ended, Work, run};
 use super::vehicle::{Terms, Vehicle};
 use crate::checkpoint::file::Identity;
 use crate::checkpoint::{self, Keeper};
-use crate::config::{Config, WaitMode};
+use crate::config::{Config, WaitMode, learned_in_words};
 use crate::engine::resume::ResumeSettings;
 use crate::engine::{self, Engine, History, Model, Use};
 
@@ -135,7 +135,7 @@ fn thread<'a>(
         tracing::warn!(
             instance = %instances[index],
             "files of this instance in shared memory were removed while it ran; opening them anew. Feeders and \
-             readers have to be started again"
+             readers of this project's library attach again by themselves"
         );
         let Some(reopened) = vehicles.remove(index).reopen(instances[index], order.stop) else {
             outcome = Ok(Ended::Stopped);
@@ -208,6 +208,7 @@ impl<'a> Use for Open<'_, 'a> {
                 estimator: config.estimator.to_string(),
                 model: M::Estimate::MODEL,
                 dimension: config.error_states() as u32,
+                mismatches: learned_in_words(config.mismatch, &config.mismatched),
             };
             let path = PathBuf::from(path.replace(INSTANCE_MARK, self.instance.as_str()));
             terms.unused_checkpoint = !resume(&mut engine, &mut ports, config, &path, &identity);

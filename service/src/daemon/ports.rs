@@ -5,7 +5,8 @@ use std::rc::Rc;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
     EstimateHead, EstimateMessage, HeadingFix, Health, INPUT_IMU, INPUT_ODOMETRY_2D,
-    INPUT_ODOMETRY_3D, ImuSample, Odometry2d, Odometry3d, PositionFix, VelocityFix, Zero,
+    INPUT_ODOMETRY_3D, ImuSample, JournalEntry, Odometry2d, Odometry3d, PositionFix, VelocityFix,
+    Zero,
 };
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{
@@ -120,6 +121,8 @@ pub struct Ports<M: Model> {
     pub smoothed: SmoothedPort,
     /// What the engine takes.
     pub journal: JournalPort,
+    /// What the engine is to take, in a daemon that is fed entry by entry.
+    pub entries: Option<Subscriber<JournalEntry>>,
     /// Health, about once a second.
     pub health: Publisher<Health>,
     /// Requests.
@@ -132,8 +135,8 @@ pub struct Ports<M: Model> {
 }
 
 impl<M: Model> Ports<M> {
-    /// Opens every port of `instance` that this configuration needs; a `stepped` daemon publishes no journal. The
-    /// memory behind them is still to be asked for ([`transport::reserve_shared_memory`]).
+    /// Opens every port of `instance` that this configuration needs; a `stepped` daemon publishes no journal, but
+    /// takes one. The memory behind them is still to be asked for ([`transport::reserve_shared_memory`]).
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy. If a daemon of this instance is
@@ -181,6 +184,10 @@ impl<M: Model> Ports<M> {
             estimates: EstimatePort::new(estimates, latest),
             smoothed: SmoothedPort::open(&node, instance, config.smoother.is_some())?,
             journal: JournalPort::open(&node, instance, publish_journal)?,
+            entries: match stepped {
+                true => Some(transport::journal(&node, instance)?.subscriber()?),
+                false => None,
+            },
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,

@@ -13,14 +13,14 @@ use std::rc::Rc;
 use anyhow::Context;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
-    EstimateMessage, HEALTH_NOT_RESUMED, HEALTH_RESUMED, INPUT_HEADING, INPUT_POSITION,
-    INPUT_VELOCITY, Message, REASON_WRONG_MODEL,
+    CONTROL_REFUSED, EstimateMessage, HEALTH_NOT_RESUMED, HEALTH_RESUMED, INPUT_HEADING,
+    INPUT_POSITION, INPUT_VELOCITY, Message, REASON_WRONG_MODEL,
 };
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{self, InputMessage};
 use tracing::warn;
 
-use super::control::answer;
+use super::control::{answer, take};
 use super::journal::JournalPort;
 use super::ports::{Ports, Refuser};
 use super::run::{Turn, Work};
@@ -44,7 +44,7 @@ pub struct Terms<'a> {
     pub config: &'a Config,
     /// Its text.
     pub config_text: &'a str,
-    /// Whether inputs come in requests, one by one, and the topics are not read.
+    /// Whether inputs come as entries of a journal, and their own topics are not read.
     pub stepped: bool,
     /// Whether there was a checkpoint that was of no use from the outset.
     pub unused_checkpoint: bool,
@@ -138,7 +138,8 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
                 .journal
                 .input(estimates, M::INPUT, sample.payload().as_bytes());
             self.ports.smoothed.publish_left(&mut self.engine);
-            self.watch.arrival(received_ns);
+            self.watch
+                .arrival(received_ns, sample.payload().header().sent_ns);
             any = true;
         }
         Ok(any)
@@ -175,7 +176,12 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
 
     /// Takes those of one topic.
     fn take(&mut self, aid: Aid, horizon_ns: u64) -> anyhow::Result<()> {
-        let Self { engine, ports, .. } = self;
+        let Self {
+            engine,
+            ports,
+            watch,
+            ..
+        } = self;
         let (inputs, outbox, journal) =
             (&mut ports.inputs, &mut ports.estimates, &mut ports.journal);
         match aid {
@@ -184,6 +190,7 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
                     .position
                     .next_until(horizon_ns, |header| engine.announce(INPUT_POSITION, header))?
                 {
+                    watch.delivery(INPUT_POSITION, fix.source, monotonic_ns());
                     engine.position(&fix, outbox);
                     journal.input(engine.estimates(), INPUT_POSITION, fix.as_bytes());
                 }
@@ -193,6 +200,7 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
                     .velocity
                     .next_until(horizon_ns, |header| engine.announce(INPUT_VELOCITY, header))?
                 {
+                    watch.delivery(INPUT_VELOCITY, fix.source, monotonic_ns());
                     engine.velocity(&fix, outbox);
                     journal.input(engine.estimates(), INPUT_VELOCITY, fix.as_bytes());
                 }
@@ -202,6 +210,7 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
                     .heading
                     .next_until(horizon_ns, |header| engine.announce(INPUT_HEADING, header))?
                 {
+                    watch.delivery(INPUT_HEADING, fix.source, monotonic_ns());
                     engine.heading(&fix, outbox);
                     journal.input(engine.estimates(), INPUT_HEADING, fix.as_bytes());
                 }
@@ -225,6 +234,28 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
         ports.smoothed.publish_left(engine);
     }
 
+    /// Takes the entries of a journal that were sent before a request; why the first that is none is none.
+    fn take_entries(&mut self) -> anyhow::Result<Option<&'static str>> {
+        let Self {
+            engine,
+            ports,
+            terms,
+            ..
+        } = self;
+        let mut fault = None;
+        let Some(entries) = &ports.entries else {
+            return Ok(fault);
+        };
+        while let Some(entry) = entries.receive().context("receiving an entry")? {
+            let estimates = &mut ports.estimates;
+            if let Err(reason) = take(engine, entry.kind, entry.message(), terms, estimates) {
+                fault = fault.or(Some(reason));
+            }
+            ports.smoothed.publish_left(engine);
+        }
+        Ok(fault)
+    }
+
     fn answer_requests(&mut self) -> anyhow::Result<()> {
         while let Some(request) = self
             .ports
@@ -232,7 +263,10 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
             .receive()
             .context("receiving a request")?
         {
-            if !self.terms.stepped {
+            let mut fault = None;
+            if self.terms.stepped {
+                fault = self.take_entries()?;
+            } else {
                 self.take_samples()?;
                 if let Some(now_ns) = self.engine.last_sample_ns() {
                     for aid in AIDS {
@@ -242,13 +276,17 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
                 }
             }
             let Self { engine, ports, .. } = self;
-            let response = answer(
+            let mut response = answer(
                 engine,
                 &request,
                 &self.terms,
                 &mut ports.estimates,
                 &mut ports.smoothed,
             );
+            if let Some(reason) = fault {
+                response.status = CONTROL_REFUSED;
+                response.set_reason(reason);
+            }
             ports.journal.request(engine.estimates(), &request);
             // A client that is gone by now has nobody to be answered.
             let _ = request.send_copy(response);
@@ -339,7 +377,8 @@ impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M
 
     fn sleep(&mut self, bound: Duration) -> anyhow::Result<()> {
         if let Some(listener) = &self.ports.wake {
-            listener.wait(bound).context("waiting for a wake-up")?;
+            let was_woken = listener.wait(bound).context("waiting for a wake-up")?;
+            self.watch.slept(was_woken);
         }
         Ok(())
     }

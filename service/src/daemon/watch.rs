@@ -3,13 +3,17 @@
 //! Everything here runs once per period, never between a sample and its estimate.
 
 use inekf_shared::message::{
-    Health, STATE_DEGRADED, STATE_RUNNING, STATE_STALE, state_name, waiting_for_name,
+    Health, SOURCES, STATE_DEGRADED, STATE_RUNNING, STATE_STALE, source_index, state_name,
+    waiting_for_name,
 };
 use tracing::{info, warn};
 
 use super::supervisor;
 use crate::engine::resume::Resumption;
 use crate::engine::tally::Tally;
+
+/// A sample may be seen so long before the wake-up that its sender makes next, ns.
+const WAKE_UP_UNDER_WAY_NS: u64 = 1_000_000;
 
 /// What the loop knows at one moment.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +48,14 @@ pub struct Watch {
     stale_after_ns: u64,
     next_ns: u64,
     last_arrival_ns: u64,
+    /// When a message of any input was last taken; 0 before the first.
+    last_delivery_ns: u64,
+    /// When one of each source of fixes was.
+    delivered_ns: [u64; SOURCES],
+    /// Whether the last sleep, if any, was ended by a sender.
+    was_woken: bool,
+    stalls: u64,
+    longest_stall_ns: u64,
     arrivals_at_last: u64,
     said: (u32, u32),
     failures_said: u64,
@@ -59,6 +71,11 @@ impl Watch {
             stale_after_ns,
             next_ns: now_ns,
             last_arrival_ns: now_ns,
+            last_delivery_ns: 0,
+            delivered_ns: [0; SOURCES],
+            was_woken: true,
+            stalls: 0,
+            longest_stall_ns: 0,
             arrivals_at_last: arrivals,
             said: (0, 0),
             failures_said: 0,
@@ -66,9 +83,29 @@ impl Watch {
         }
     }
 
-    /// Notes that motion samples arrived at `now_ns`.
-    pub fn arrival(&mut self, now_ns: u64) {
+    /// Notes that a motion sample that was sent at `sent_ns` arrived at `now_ns`.
+    pub fn arrival(&mut self, now_ns: u64, sent_ns: u64) {
         self.last_arrival_ns = now_ns;
+        self.last_delivery_ns = now_ns;
+        let on_its_way_ns = now_ns.saturating_sub(sent_ns);
+        if !core::mem::replace(&mut self.was_woken, true) && on_its_way_ns > WAKE_UP_UNDER_WAY_NS {
+            self.stalls += 1;
+            self.longest_stall_ns = self.longest_stall_ns.max(on_its_way_ns);
+        }
+    }
+
+    /// Notes that the loop has slept, and whether a sender woke it. If none did and there is a sample, that one stalled.
+    pub fn slept(&mut self, was_woken: bool) {
+        self.was_woken = was_woken;
+    }
+
+    /// Notes that a fix of this topic and source was taken at `now_ns`.
+    pub fn delivery(&mut self, input: usize, source: u32, now_ns: u64) {
+        self.last_delivery_ns = now_ns;
+        if let Some(last) = source_index(input, source).and_then(|at| self.delivered_ns.get_mut(at))
+        {
+            *last = now_ns;
+        }
     }
 
     /// Whether a health message is due.
@@ -108,6 +145,12 @@ impl Watch {
             checkpoints: moment.checkpoints,
             checkpoint_failures: moment.checkpoint_failures,
             journal_failures: moment.journal_failures,
+            last_fix_stamp_ns: tally.last_fix_stamp_ns,
+            last_delivery_ns: self.last_delivery_ns,
+            fused_stamp_ns: tally.fused_stamp_ns,
+            delivered_ns: self.delivered_ns,
+            stalls: self.stalls,
+            longest_stall_ns: self.longest_stall_ns,
         }
     }
 

@@ -34,8 +34,8 @@ pub struct Engine<M: Model, H = Timeline<M>> {
     history: H,
     stack: Stack<M::Measurement>,
     time_base: TimeBase,
-    /// The last position fix that came before there was a state, with its time.
-    first_position: Option<(u64, Antenna)>,
+    /// The last position fix that came before there was a state, with its time and source.
+    first_position: Option<(u64, u32, Antenna)>,
     /// A state that was requested before the first sample, to hold from that sample on.
     requested: Option<M::State>,
     /// A state of an earlier life, to continue from if the first sample says that it can be.
@@ -460,7 +460,7 @@ impl<M: Model, H: History<M>> Engine<M, H> {
             Some(antenna) if usable => {
                 if self
                     .first_position
-                    .replace((fix.stamp_ns, antenna))
+                    .replace((fix.stamp_ns, fix.source, antenna))
                     .is_some()
                 {
                     self.output.tally.refuse(Refusal(REASON_NOT_READY));
@@ -487,6 +487,7 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         let Some(r_wb) = self.model.attitude(stamp_ns, input) else {
             return false;
         };
+        let mut started_by = None;
         let (start_ns, antenna) = match self.model.initial().position {
             PositionSource::Given { position_w, sigma } => (
                 without_ns,
@@ -498,13 +499,14 @@ impl<M: Model, H: History<M>> Engine<M, H> {
             ),
             PositionSource::FirstFix => match self.first_position {
                 // A fix ahead of the samples waits for them; an old one is no place to start from.
-                Some((fix_ns, antenna)) if fix_ns <= stamp_ns => {
+                Some((fix_ns, source, antenna)) if fix_ns <= stamp_ns => {
                     self.first_position = None;
                     if stamp_ns - fix_ns > self.oldest_start_ns() {
                         self.output.tally.refuse(Refusal(REASON_NOT_READY));
                         return false;
                     }
                     self.output.tally.counters.accepted += 1;
+                    started_by = Some((source, fix_ns));
                     (self.model.start_ns(Some(fix_ns), stamp_ns, input), antenna)
                 }
                 _ => return false,
@@ -513,6 +515,9 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         let alignment = self.model.initial().alignment(r_wb, &antenna);
         let state = self.model.aligned(&alignment);
         self.start(start_ns, of_stamp(start_ns), state);
+        if let Some((source, fix_ns)) = started_by {
+            self.output.tally.fused(INPUT_POSITION, source, fix_ns);
+        }
         true
     }
 

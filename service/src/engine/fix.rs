@@ -2,7 +2,12 @@
 
 use core::fmt::Debug;
 
+use inekf_shared::message::{INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY};
 use nalgebra::{Matrix3, Vector3};
+
+/// Every so many fixes of a sender the covariance is looked at: far more often than it takes to become indefinite, and
+/// too seldom to be noticed in the time of an update.
+const MENDED_EVERY: u64 = 16;
 
 /// What a fix measures. The order breaks ties between equal stamps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,6 +23,15 @@ pub enum FixKind {
 impl FixKind {
     /// Number of kinds.
     pub const COUNT: usize = 3;
+
+    /// The `INPUT_*` index of its topic.
+    pub const fn input(self) -> usize {
+        match self {
+            Self::Position => INPUT_POSITION,
+            Self::Velocity => INPUT_VELOCITY,
+            Self::Heading => INPUT_HEADING,
+        }
+    }
 }
 
 /// The measured values of a model's fixes, with the settings of their source already applied.
@@ -67,9 +81,20 @@ impl<Z: Measurement> Fix<Z> {
         self.measurement.kind()
     }
 
+    /// Its source, and that of the one that was stacked with it.
+    pub fn sources(&self) -> impl Iterator<Item = u32> {
+        [Some(self.source), self.partner].into_iter().flatten()
+    }
+
     /// Messages that it is made of.
     pub fn count(&self) -> u64 {
         1 + u64::from(self.partner.is_some())
+    }
+
+    /// Whether the covariance is looked at after this one, and mended if rounding has made it indefinite. Chosen by the
+    /// fix's own number, so that a replay does the same.
+    pub fn is_mended(&self) -> bool {
+        self.seq.is_multiple_of(MENDED_EVERY)
     }
 
     /// What orders fixes: time, kind, source, number. A log therefore gives the same estimates

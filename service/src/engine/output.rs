@@ -70,6 +70,7 @@ impl<E: EstimateMessage> Output<E> {
     /// Notes that the state was set to `place_w` at `stamp_ns`.
     pub fn started(&mut self, stamp_ns: u64, place_w: &Vector3<f64>) {
         self.announce_resumed = false;
+        self.tally.forget_fused();
         if self.has_started {
             let head = self.message.head_mut();
             head.reset_count += 1;
@@ -130,6 +131,10 @@ impl<E: EstimateMessage> Output<E> {
                 }
                 self.tally.counters.accepted += fix.count();
                 self.last_aided_ns = self.last_aided_ns.max(fix.stamp_ns);
+                for source in fix.sources() {
+                    let input = fix.kind().input();
+                    self.tally.fused(input, source, fix.stamp_ns);
+                }
                 let flags = if *replayed {
                     ESTIMATE_UPDATED | ESTIMATE_REPLAYED
                 } else {
@@ -150,7 +155,7 @@ impl<E: EstimateMessage> Output<E> {
         if fix.kind() != FixKind::Position {
             return;
         }
-        for source in [Some(fix.source), fix.partner].into_iter().flatten() {
+        for source in fix.sources() {
             if let Some(nis) = self.message.head_mut().nis.get_mut(source as usize) {
                 *nis = fused.nis;
             }

@@ -62,7 +62,7 @@ pub fn covariance<const N: usize>(state: &StateVector) -> Result<Covariance<N>, 
 
 /// Whether `p` plus a rounding error on its diagonal has a Cholesky factor, after scaling to unit
 /// variances (the units differ by many orders of magnitude).
-fn is_positive_semidefinite<const N: usize>(p: &SMatrix<f64, N, N>) -> bool {
+pub fn is_positive_semidefinite<const N: usize>(p: &SMatrix<f64, N, N>) -> bool {
     let mut scaled = *p;
     for row in 0..N {
         for column in 0..N {

@@ -1,6 +1,6 @@
 //! What became of every input: nothing is refused or missed without being counted.
 
-use inekf_shared::message::{Counters, Header, INPUTS, REASONS};
+use inekf_shared::message::{Counters, Header, INPUTS, REASONS, SOURCES, source_index};
 
 /// Why an input was refused; the code is that of `inekf_shared::message::REASON_*`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +36,10 @@ pub struct Tally {
     pub rejected_by_reason: [u64; REASONS],
     /// Messages received by topic.
     pub received: [u64; INPUTS],
+    /// Stamp of the newest fix fused since the state was last set, of any source; 0 if none was.
+    pub last_fix_stamp_ns: u64,
+    /// The same of each source, by [`source_index`].
+    pub fused_stamp_ns: [u64; SOURCES],
     /// Messages of any topic that were noted; tells which sender was heard of last.
     announced: u64,
     numbering: [[Numbering; SENDERS]; INPUTS],
@@ -79,6 +83,22 @@ impl Tally {
             lost: 0,
             repeated: false,
         }
+    }
+
+    /// Notes that a fix of this time, topic and source was fused.
+    pub fn fused(&mut self, input: usize, source: u32, stamp_ns: u64) {
+        self.last_fix_stamp_ns = self.last_fix_stamp_ns.max(stamp_ns);
+        if let Some(newest) =
+            source_index(input, source).and_then(|at| self.fused_stamp_ns.get_mut(at))
+        {
+            *newest = (*newest).max(stamp_ns);
+        }
+    }
+
+    /// Forgets which fixes were fused: the state has been set anew, and there may be another clock.
+    pub fn forget_fused(&mut self) {
+        self.last_fix_stamp_ns = 0;
+        self.fused_stamp_ns = [0; SOURCES];
     }
 
     /// Counts a refusal.

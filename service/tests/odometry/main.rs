@@ -8,6 +8,7 @@ mod filters;
 mod gate;
 mod harness;
 mod late;
+mod learned;
 mod oracle;
 mod random;
 mod recordings;

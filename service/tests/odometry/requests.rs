@@ -89,7 +89,11 @@ fn a_snapshot_sets_the_same_state() {
             let second = run(&text, &[Input::Set(first)]).snapshot.unwrap();
             let numbers = |s: &StateVector| {
                 let all = s.q_wb.iter().chain(&s.p_w_m).chain(&s.covariance);
-                all.copied().collect::<Vec<f64>>()
+                let learned = s.parameters.iter().chain(&s.parameter_covariance);
+                all.chain(learned)
+                    .chain(&s.mode_weights)
+                    .copied()
+                    .collect::<Vec<f64>>()
             };
             for (a, b) in numbers(&first).iter().zip(numbers(&second)) {
                 assert!((a - b).abs() < 1e-12, "{}: {a} {b}", choice.name);

@@ -4,7 +4,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
 use super::layout::layout;
-use super::{Counters, INPUTS, NAV_TRI, ProcessNoise, REASONS, serde_array};
+use super::{Counters, INPUTS, MAX_MISMATCHES, NAV_TRI, ProcessNoise, REASONS, serde_array};
 
 /// Request: forget the state and initialise anew.
 pub const CONTROL_RESET: u32 = 1;
@@ -68,13 +68,19 @@ pub const MAX_INPUT_LEN: usize = 136;
 /// Bytes of the text of a refusal.
 pub const REASON_TEXT_LEN: usize = 256;
 
-/// A state of any model with its covariance.
+/// Entries of [`StateVector::parameter_covariance`]: [`MAX_MISMATCHES`] columns beside a pose of 6 dimensions.
+pub const PARAMETER_TRI: usize = 6 * MAX_MISMATCHES + MAX_MISMATCHES * (MAX_MISMATCHES + 1) / 2;
+
+/// Hypotheses of an adaptive filter on how its mismatches behave: entries of [`StateVector::mode_weights`].
+pub const MODES: usize = 9;
+
+/// A state of any model with its covariance, and what a filter has learned beside the pose.
 ///
 /// In the plane `q_wb` turns about z, `p_w_m` is `(x, y, 0)` and `dimension` is 3. The covariance is that of the
 /// left-invariant error, as in the estimates.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.StateVector.v1")]
+#[type_name("inekf.StateVector.v2")]
 pub struct StateVector {
     /// `MODEL_*` code.
     pub model: u32,
@@ -95,19 +101,33 @@ pub struct StateVector {
     /// Upper triangle of the `dimension` x `dimension` covariance, row by row, then zeros.
     #[serde(with = "serde_array")]
     pub covariance: [f64; NAV_TRI],
+    /// Parameters of mismatches in `parameters`. In a request 0 means that what is estimated beside the pose begins as
+    /// configured.
+    pub parameter_count: u32,
+    /// Weights in `mode_weights`: all of an adaptive filter, else 0.
+    pub mode_count: u32,
+    /// Estimated parameters of the declared mismatches, as in the estimates, then zeros.
+    pub parameters: [f64; MAX_MISMATCHES],
+    /// Their covariance, a column for each: with the `dimension` components of the pose, then with the parameters up to
+    /// itself; then zeros.
+    #[serde(with = "serde_array")]
+    pub parameter_covariance: [f64; PARAMETER_TRI],
+    /// Weights of the modes of an adaptive filter (`inekf::filter::standard_modes`), which add up to one; else zeros.
+    pub mode_weights: [f64; MODES],
 }
 
 layout! {
-    StateVector as "inekf.StateVector.v1", size 1104, align 8 {
+    StateVector as "inekf.StateVector.v2", size 1688, align 8 {
         model: 0, dimension: 4, stamp_ns: 8, q_wb: 16, v_w_mps: 48, p_w_m: 72, gyro_bias_rps: 96,
-        accel_bias_mps2: 120, covariance: 144,
+        accel_bias_mps2: 120, covariance: 144, parameter_count: 1104, mode_count: 1108,
+        parameters: 1112, parameter_covariance: 1160, mode_weights: 1616,
     }
 }
 
 /// What a client asks of the daemon.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.ControlRequest.v2")]
+#[type_name("inekf.ControlRequest.v3")]
 pub struct ControlRequest {
     /// `CONTROL_*` kind.
     pub kind: u32,
@@ -126,15 +146,15 @@ pub struct ControlRequest {
 }
 
 layout! {
-    ControlRequest as "inekf.ControlRequest.v2", size 1328, align 8 {
-        kind: 0, argument: 4, request_id: 8, state: 16, noise: 1120, input: 1192,
+    ControlRequest as "inekf.ControlRequest.v3", size 1912, align 8 {
+        kind: 0, argument: 4, request_id: 8, state: 16, noise: 1704, input: 1776,
     }
 }
 
 /// What the daemon answers.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.ControlResponse.v4")]
+#[type_name("inekf.ControlResponse.v5")]
 pub struct ControlResponse {
     /// The id of the request.
     pub request_id: u64,
@@ -165,7 +185,7 @@ pub struct ControlResponse {
 }
 
 layout! {
-    ControlResponse as "inekf.ControlResponse.v4", size 1624, align 8 {
+    ControlResponse as "inekf.ControlResponse.v5", size 2208, align 8 {
         request_id: 0, status: 8, state_code: 12, waiting_for: 16, reason_len: 20, reason: 24,
         counters: 280, received: 328, rejected_by_reason: 376, smoothed: 504, config_len: 512,
         state: 520,

@@ -3,8 +3,8 @@
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
-use super::Counters;
 use super::layout::layout;
+use super::{Counters, MAX_SOURCES};
 
 /// State: not initialised; [`Health::waiting_for`] says what is missing.
 pub const STATE_WAITING: u32 = 1;
@@ -135,6 +135,20 @@ pub const fn input_name(index: usize) -> &'static str {
     }
 }
 
+/// Sources of fixes that [`Health`] tells apart: [`MAX_SOURCES`] of each of position, velocity and heading, in this
+/// order. The place of one is [`source_index`].
+pub const SOURCES: usize = 3 * MAX_SOURCES;
+
+/// Place of a source of the topic with the `INPUT_*` index `input` in [`Health::fused_stamp_ns`] and
+/// [`Health::delivered_ns`]: `8 (input - INPUT_POSITION) + source`; `None` if there is no such source.
+#[must_use]
+pub const fn source_index(input: usize, source: u32) -> Option<usize> {
+    if input < INPUT_POSITION || input >= INPUTS || source as usize >= MAX_SOURCES {
+        return None;
+    }
+    Some((input - INPUT_POSITION) * MAX_SOURCES + source as usize)
+}
+
 /// Flag: the estimate began with the state of a checkpoint.
 pub const HEALTH_RESUMED: u32 = 1;
 /// Flag: there was a checkpoint, and it could not be used; the log says why.
@@ -145,7 +159,7 @@ pub const HEALTH_FLAGS: u32 = HEALTH_RESUMED | HEALTH_NOT_RESUMED;
 /// How the daemon is, about once a second.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.Health.v3")]
+#[type_name("inekf.Health.v4")]
 pub struct Health {
     /// When it was written, CLOCK_MONOTONIC, nanoseconds.
     pub stamp_ns: u64,
@@ -177,12 +191,52 @@ pub struct Health {
     pub checkpoint_failures: u64,
     /// Entries that are missing from the journal because they could not be published.
     pub journal_failures: u64,
+    /// Stamp of the newest fix, of any source, that was fused since the state was last set, nanoseconds of the sensor
+    /// clock; 0 if none was. Its age, in sensor time, is [`Health::fix_age_ns`].
+    pub last_fix_stamp_ns: u64,
+    /// When the daemon last took a message of any of its inputs, CLOCK_MONOTONIC, nanoseconds; 0 before the first. How
+    /// long ago that is does not depend on any stamp of a sensor: [`Health::delivery_age_ns`].
+    pub last_delivery_ns: u64,
+    /// Stamp of the newest fix of each source that was fused since the state was last set, nanoseconds of the sensor
+    /// clock, 0 if none was; indexed by [`source_index`].
+    pub fused_stamp_ns: [u64; SOURCES],
+    /// When the daemon last took a message of each source, whatever became of it, CLOCK_MONOTONIC, nanoseconds, 0 before
+    /// the first; indexed by [`source_index`]. A fix ahead of the samples is taken once they have caught up.
+    pub delivered_ns: [u64; SOURCES],
+    /// How often, in event mode, a sample was found at the end of a bounded wait that nobody had ended: its wake-up was
+    /// lost, or its sender does not send any.
+    pub stalls: u64,
+    /// The longest that such a sample had been on its way, from its sending, nanoseconds.
+    pub longest_stall_ns: u64,
+}
+
+impl Health {
+    /// Sensor time from a stamp of this message to the last accepted sample, nanoseconds: the age of an observation.
+    /// `None` for a stamp of 0: there was none.
+    #[must_use]
+    pub const fn fix_age_ns(&self, stamp_ns: u64) -> Option<u64> {
+        if stamp_ns == 0 {
+            return None;
+        }
+        Some(self.last_imu_stamp_ns.saturating_sub(stamp_ns))
+    }
+
+    /// Time from a delivery to this message, nanoseconds of CLOCK_MONOTONIC. `None` for 0: there was none.
+    #[must_use]
+    pub const fn delivery_age_ns(&self, delivered_ns: u64) -> Option<u64> {
+        if delivered_ns == 0 {
+            return None;
+        }
+        Some(self.stamp_ns.saturating_sub(delivered_ns))
+    }
 }
 
 layout! {
-    Health as "inekf.Health.v3", size 304, align 8 {
+    Health as "inekf.Health.v4", size 720, align 8 {
         stamp_ns: 0, uptime_ns: 8, instance_pid: 16, state: 24, waiting_for: 28, model: 32,
         flags: 36, last_imu_stamp_ns: 40, imu_rate_hz: 48, counters: 56, rejected_by_reason: 104,
         received: 232, checkpoints: 280, checkpoint_failures: 288, journal_failures: 296,
+        last_fix_stamp_ns: 304, last_delivery_ns: 312, fused_stamp_ns: 320, delivered_ns: 512,
+        stalls: 704, longest_stall_ns: 712,
     }
 }

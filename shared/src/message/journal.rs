@@ -66,7 +66,7 @@ const _: () = {
 /// Something that the engine took.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
-#[type_name("inekf.JournalEntry.v1")]
+#[type_name("inekf.JournalEntry.v2")]
 pub struct JournalEntry {
     /// Counts the entries of one daemon, from 0 by one.
     pub index: u64,
@@ -82,7 +82,7 @@ pub struct JournalEntry {
 }
 
 layout! {
-    JournalEntry as "inekf.JournalEntry.v1", size 1352, align 8 {
+    JournalEntry as "inekf.JournalEntry.v2", size 1936, align 8 {
         index: 0, estimates: 8, kind: 16, size: 20, payload: 24,
     }
 }

@@ -4,6 +4,7 @@
 //! finds it. A long-lived process looks now and then whether its files are still there.
 
 use std::fs;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use super::inspect::SHARED_MEMORY;
@@ -12,7 +13,33 @@ use super::{Node, TransportError};
 
 /// The files without which nobody can attach: the node's own, the services' that it has open, and its ports' data.
 #[derive(Clone, Debug, Default)]
-pub struct Watched(Vec<PathBuf>);
+pub struct Watched(Vec<Seen>);
+
+/// A file as it was: its place, and which file of that name it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Seen {
+    path: PathBuf,
+    device: u64,
+    inode: u64,
+}
+
+impl Seen {
+    /// The file that is at `path` now.
+    fn at(path: PathBuf) -> Option<Self> {
+        let metadata = fs::symlink_metadata(&path).ok()?;
+        Some(Self {
+            path,
+            device: metadata.dev(),
+            inode: metadata.ino(),
+        })
+    }
+
+    /// Whether it is there: `None` if nothing is, false if another file is.
+    fn is_there(&self) -> Option<bool> {
+        let now = Self::at(self.path.clone())?;
+        Some(now == *self)
+    }
+}
 
 impl Watched {
     /// Those of a node whose ports are all made. Assumes that no other node of this process uses the same prefix.
@@ -20,6 +47,18 @@ impl Watched {
     /// # Errors
     /// [`TransportError::Internal`] if the folders cannot be read.
     pub fn of(node: &Node) -> Result<Self, TransportError> {
+        Self::listed(node, true)
+    }
+
+    /// Those of a node whose services are all open, without its ports' data: for one of several nodes of a process.
+    ///
+    /// # Errors
+    /// As [`Watched::of`].
+    pub fn services_of(node: &Node) -> Result<Self, TransportError> {
+        Self::listed(node, false)
+    }
+
+    fn listed(node: &Node, with_data: bool) -> Result<Self, TransportError> {
         let global = &node.config().global;
         let own = node.id().value();
         let prefix = global.prefix.to_string();
@@ -49,7 +88,7 @@ impl Watched {
         let is_needed = |name: &String| {
             let ids = name.strip_prefix(&prefix).map(ids).unwrap_or_default();
             let [id] = ids[..] else { return false };
-            (name.ends_with(&data_suffix) && process_of(id) == std::process::id())
+            (with_data && name.ends_with(&data_suffix) && process_of(id) == std::process::id())
                 || (name.ends_with(&shared_suffix) && used.contains(&id))
         };
         let segments = names(Path::new(SHARED_MEMORY))?.into_iter();
@@ -58,14 +97,19 @@ impl Watched {
                 .filter(is_needed)
                 .map(|name| Path::new(SHARED_MEMORY).join(name)),
         );
-        files.retain(|file| file.exists());
-        Ok(Self(files))
+        Ok(Self(files.into_iter().filter_map(Seen::at).collect()))
     }
 
-    /// Whether all of them are still there. One system call for each.
+    /// Whether all of them are still there, and are the same. One system call for each.
     #[must_use]
     pub fn is_intact(&self) -> bool {
-        self.0.iter().all(|file| file.exists())
+        self.0.iter().all(|file| file.is_there() == Some(true))
+    }
+
+    /// Whether others lie in the place of some: who lets go of the old ones would remove those.
+    #[must_use]
+    pub fn is_replaced(&self) -> bool {
+        self.0.iter().any(|file| file.is_there() == Some(false))
     }
 }
 

@@ -48,8 +48,7 @@ pub fn daemon(plan: &Plan) -> Outcome {
         drop(observer);
         next.stop();
     }
-    let after = scene.files_after_doctor();
-    assert_eq!(after, 0);
+    let after = scene.cleared();
     Outcome {
         count: plan.rounds,
         survivors: "a reader",
@@ -116,10 +115,7 @@ fn beside_a_daemon(
     if let Some(feeder) = feeder {
         killed(kill(feeder));
     }
-    daemon.stop();
-    drop(observer);
-    let after = scene.files_after_doctor();
-    assert_eq!(after, 0);
+    let after = scene.end(daemon, observer);
     Outcome {
         count: plan.rounds,
         survivors,

@@ -10,7 +10,7 @@ use inekf_shared::message::{
 };
 use rustix::process::{Pid, Signal, kill_process};
 
-use super::kills::{kill, killed, settled};
+use super::kills::{kill, killed, unbroken};
 use super::scene::{CONFIG, INSTANCE, Scene, rest};
 use super::{Balance, Outcome, Plan};
 use crate::link::{HealthReader, Link, RawFeeder, instance};
@@ -102,8 +102,7 @@ impl Bench {
         let before = self.scene.files();
         drop((self.link, self.feeder));
         self.daemon.stop();
-        let after = self.scene.files_after_doctor();
-        assert_eq!(after, 0);
+        let after = self.scene.cleared();
         (before, after)
     }
 }
@@ -125,12 +124,8 @@ pub fn another_rate(plan: &Plan) -> Outcome {
         killed(kill(feeder));
         observer.watch_for(Duration::from_millis(20));
     }
-    let (balance, resets) = settled(&scene, &mut observer);
-    assert_eq!(resets, 0);
-    drop(observer);
-    daemon.stop();
-    let after = scene.files_after_doctor();
-    assert_eq!(after, 0);
+    let balance = unbroken(&scene, &mut observer);
+    let after = scene.end(daemon, observer);
     Outcome {
         count: rounds,
         survivors: "daemon, reader",
@@ -321,8 +316,7 @@ pub fn bursts(plan: &Plan) -> Outcome {
     let before = scene.files();
     drop((feeder, link));
     daemon.stop();
-    let after = scene.files_after_doctor();
-    assert_eq!(after, 0);
+    let after = scene.cleared();
     Outcome {
         count: rounds,
         survivors: "daemon, feeder, reader",

@@ -8,12 +8,15 @@
 //! * [`kills`], [`early`]: SIGKILL at any moment, and in the first 25 ms; [`stop`]: SIGTERM in every state
 //! * [`inputs`], [`sources`]: clocks, gaps, duplicates, bursts; position sources that freeze, lie or are late
 //! * [`resources`]: full shared memory, deleted files, file descriptors
+//! * [`disk`]: no room for checkpoints and recordings; [`privileges`]: real-time priority and locked memory refused
 
+pub mod disk;
 pub mod early;
 pub mod inputs;
 pub mod kills;
 pub mod outcome;
 pub mod plan;
+pub mod privileges;
 pub mod resources;
 pub mod scene;
 pub mod sources;
@@ -64,6 +67,9 @@ rows! {
     "shm-fills-up", "/dev/shm fills up while the daemon runs" => resources::shared_memory_fills_up;
     "shm-deleted", "files in shared memory deleted while in use" => resources::files_deleted;
     "descriptors", "too few file descriptors" => resources::descriptors;
+    "disk-full", "full disk under the checkpoint and under a recorder" => disk::full;
+    "disk-read-only", "the disk of the checkpoint becomes read-only" => disk::read_only;
+    "privileges", "real-time priority and memory lock refused" => privileges::refused;
     "stop", "SIGTERM in every state" => stop::in_every_state;
 }
 

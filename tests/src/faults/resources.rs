@@ -5,11 +5,13 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
+use inekf_shared::clock::monotonic_ns;
 use rustix::process::Signal;
 
 use super::kills::{kill, killed, lives};
-use super::scene::{CONFIG, Scene};
+use super::scene::{CONFIG, INSTANCE, Scene};
 use super::{Outcome, Plan};
+use crate::link;
 use crate::process::{Ended, Running, config_file, eventually};
 use crate::programs::programs;
 
@@ -106,8 +108,7 @@ pub fn shared_memory_full(plan: &Plan) -> Outcome {
             }
             _ => panic!("{kib} KiB: {ended:#?}"),
         }
-        after = after.max(scene.files_after_doctor());
-        assert_eq!(after, 0);
+        after = after.max(scene.cleared());
     }
     assert!(refused > 0 && started > 0, "{refused} {started}");
     Outcome {
@@ -144,20 +145,29 @@ pub fn shared_memory_fills_up(plan: &Plan) -> Outcome {
     }
 }
 
-/// Somebody removes what lies in shared memory. The daemon notices, opens its ports anew and keeps its state; feeders
-/// and readers that are started again attach.
+/// Somebody removes what lies in shared memory. The daemon notices, opens its ports anew and keeps its state; the feeder
+/// and the readers, in processes of their own and in this one, attach again by themselves, and so do new ones.
 pub fn files_deleted(plan: &Plan) -> Outcome {
     let rounds = plan.at_most(100);
     let mut times = Vec::new();
-    let mut after = 0;
+    let (mut before, mut after) = (0, 0);
+    let mut noticed = Vec::new();
     for round in 0..rounds {
         let scene = Scene::new();
         let daemon = scene.daemon();
-        let feeder = scene.feeder(plan, 500);
-        let last = {
-            let mut observer = scene.observer();
-            observer.wait()
+        let mut feeder = scene.feeder(plan, 500);
+        let mut reader = scene.reader(plan);
+        let mut observer = scene.observer();
+        let latest = {
+            observer.wait();
+            link::latest(&scene.memory, INSTANCE)
         };
+        eventually("an estimate at the reader", || {
+            observer.look();
+            (lives(&reader) == 1).then_some(())
+        });
+        let last = observer.wait();
+        before = before.max(scene.files());
         match round % 3 {
             0 => remove(&scene.memory.shared_paths()),
             1 => remove(&scene.memory.root_files()),
@@ -168,40 +178,58 @@ pub fn files_deleted(plan: &Plan) -> Outcome {
         }
         let started = Instant::now();
         eventually("the daemon's notice", || {
-            let said = daemon.stderr();
-            said.contains("opening them anew").then_some(())
+            observer.look_with_losses();
+            daemon.stderr().contains("opening them anew").then_some(())
         });
-        killed(kill(feeder));
-        // Until the daemon has its ports again, a reader would make services that are swept away under it.
-        eventually("the daemon's new ports", || {
-            let said = daemon.stderr();
-            said.contains("the ports are open again").then_some(())
+        noticed.push(started.elapsed());
+        let at_ns = monotonic_ns();
+        // Of a sample that was sent later than the daemon noticed: daemon, feeder and reader have found each other again.
+        let estimate = eventually("an estimate that goes through all of them again", || {
+            // A controller's reader of the newest estimate attaches beside it.
+            latest.read();
+            observer
+                .look_with_losses()
+                .filter(|estimate| estimate.head.sent_ns > at_ns)
         });
-        let mut observer = scene.observer();
-        let next = scene.feeder(plan, 500);
-        let estimate = observer.wait();
         times.push(started.elapsed());
         // The same estimate goes on: it was neither restarted nor reset.
         assert_eq!(estimate.head.reset_count, last.head.reset_count);
         assert!(estimate.head.estimate_seq > last.head.estimate_seq);
-        let reader = scene.reader(plan);
-        eventually("an estimate at a new reader", || {
-            observer.look();
-            (lives(&reader) == 1).then_some(())
+        eventually("the newest estimate where a controller reads it", || {
+            observer.look_with_losses();
+            (latest.read().head.sent_ns > at_ns).then_some(())
         });
-        killed(kill(next));
-        killed(kill(reader));
-        drop(observer);
-        daemon.stop();
-        after = after.max(scene.files_after_doctor());
-        assert_eq!(after, 0);
+        eventually("estimates at the reader of another process", || {
+            observer.look_with_losses();
+            (lives(&reader) >= 2).then_some(())
+        });
+        for party in [&mut feeder, &mut reader] {
+            assert!(party.is_running(), "{}", party.stderr());
+        }
+        assert!(observer.reattached() > 0);
+        // Who comes now attaches too.
+        let newcomer = scene.reader(plan);
+        eventually("an estimate at a new reader", || {
+            observer.look_with_losses();
+            (lives(&newcomer) == 1).then_some(())
+        });
+        for party in [feeder, reader, newcomer] {
+            killed(kill(party));
+        }
+        after = after.max(scene.end(daemon, (observer, latest)));
     }
+    noticed.sort_unstable();
+    let longest = noticed.last().copied().unwrap_or_default();
     Outcome {
         count: rounds,
-        survivors: "daemon (feeder and reader have to be started again)",
+        survivors: "daemon, feeder, readers",
         times,
-        files: Some((0, after)),
-        note: "the daemon notices within a quarter of a second, and keeps its state".to_owned(),
+        files: Some((before, after)),
+        note: format!(
+            "in /dev/shm, of nodes and services, or both; the daemon notices within {:.0} ms and keeps its state; feeder \
+             and readers attach by themselves; time: from the removal until an estimate goes through all of them again",
+            longest.as_secs_f64() * 1e3
+        ),
         ..Outcome::default()
     }
 }
@@ -252,8 +280,7 @@ pub fn descriptors(plan: &Plan) -> Outcome {
             }
             refused += 1;
         }
-        after = after.max(scene.files_after_doctor());
-        assert_eq!(after, 0);
+        after = after.max(scene.cleared());
     }
     Outcome {
         count: rounds,

@@ -92,6 +92,20 @@ impl Scene {
         )
     }
 
+    /// Stops the daemon and whoever else is `left`, and asserts that nothing of theirs is.
+    pub fn end(&self, daemon: Daemon, left: impl Sized) -> usize {
+        daemon.stop();
+        drop(left);
+        self.cleared()
+    }
+
+    /// Asserts that `doctor` leaves nothing, which it returns.
+    pub fn cleared(&self) -> usize {
+        let after = self.files_after_doctor();
+        assert_eq!(after, 0, "files are left");
+        after
+    }
+
     /// Files in shared memory and under the root.
     pub fn files(&self) -> usize {
         self.memory.shared_files().len() + self.memory.root_files().len()
@@ -139,6 +153,18 @@ impl Observer {
 
     /// Takes what has come, and gives the newest there ever was.
     pub fn look(&mut self) -> Option<EstimateSe23> {
+        let last = self.look_with_losses();
+        assert_eq!(self.reader.missed(), 0);
+        last
+    }
+
+    /// How often the reader attached anew.
+    pub fn reattached(&self) -> u64 {
+        self.reader.reattached()
+    }
+
+    /// The same where estimates may be lost.
+    pub fn look_with_losses(&mut self) -> Option<EstimateSe23> {
         while let Some(estimate) = self.reader.next_estimate().expect("it can be received") {
             let finite = estimate.p_w_m.iter().chain(&estimate.q_wb);
             assert!(finite.copied().all(f64::is_finite), "{estimate:?}");
@@ -152,7 +178,6 @@ impl Observer {
             self.answers += u64::from(estimate.head.flags & ESTIMATE_PROPAGATED != 0);
             self.last = Some(estimate);
         }
-        assert_eq!(self.reader.missed(), 0);
         self.last
     }
 
@@ -186,6 +211,17 @@ impl Observer {
             }
             assert!(started.elapsed() < PATIENCE, "no estimate came any more");
             sleep(Duration::from_micros(200));
+        }
+    }
+
+    /// Waits until no estimate has come for a while: what was sent has been answered and has left.
+    pub fn wait_for_silence(&mut self) {
+        loop {
+            let before = self.look().map(|last| last.head.estimate_seq);
+            sleep(Duration::from_millis(50));
+            if self.look().map(|last| last.head.estimate_seq) == before {
+                return;
+            }
         }
     }
 

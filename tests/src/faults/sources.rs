@@ -39,8 +39,7 @@ fn run(config: &str, events: impl IntoIterator<Item = Event>) -> Run {
     let before = scene.files();
     drop(link);
     daemon.stop();
-    let after = scene.files_after_doctor();
-    assert_eq!(after, 0);
+    let after = scene.cleared();
     Run {
         estimates,
         answer,

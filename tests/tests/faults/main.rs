@@ -59,5 +59,8 @@ short! {
     a_feeder_without_shared_memory_says_so: "shm-fills-up", 1;
     deleted_files_are_made_anew: "shm-deleted", 3;
     too_few_descriptors_are_said_at_the_start: "descriptors", 8;
+    a_full_disk_stops_no_estimate: "disk-full", 1;
+    a_read_only_disk_stops_no_estimate: "disk-read-only", 1;
+    what_the_system_refuses_is_said: "privileges", 2;
     every_state_is_left_by_sigterm: "stop", 1;
 }

@@ -38,6 +38,7 @@ fn identity(estimator: &str) -> Identity {
         estimator: estimator.to_owned(),
         model: MODEL_IMU,
         dimension: 15,
+        mismatches: String::new(),
     }
 }
 

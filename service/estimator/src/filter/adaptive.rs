@@ -116,6 +116,30 @@ where
         }
     }
 
+    /// The bank whose modes all start from `belief` in pose and mismatches, with these `weights`: what is known of a bank
+    /// from its [`estimate`](Self::estimate) and [`weights`](Self::weights), which are then those of the new one. How the
+    /// modes differed is forgotten; measurements tell them apart again.
+    ///
+    /// The weights are not negative, and not all zero; they are made to add up to one.
+    pub fn resumed(
+        belief: &Belief<Augmented<G, B, P, D>, Left, D>,
+        weights: [f64; S],
+        modes: [Mode<P>; S],
+        switching: Switching<S>,
+        options: UpdateOptions,
+    ) -> Self {
+        let total: f64 = weights.iter().sum();
+        Self {
+            modes,
+            switching,
+            options,
+            beliefs: [*belief; S],
+            weights: weights.map(|weight| weight / total),
+            unmixed_s: 0.0,
+            measured: false,
+        }
+    }
+
     /// Moves every mode by one step of odometry, seen with its own mismatches; `q` is the covariance of the
     /// step's noise, B x B, of the left-invariant error.
     pub fn advance<const N: usize>(

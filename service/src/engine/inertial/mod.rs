@@ -250,8 +250,7 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
     ) -> Result<Fused, UpdateError> {
         let options = self.fusion.options(gated);
         let fused = fix.measurement.fuse(belief, &options)?;
-        // Chosen by the fix's own number, so that a replay does the same.
-        if fused.verdict == Verdict::Accepted && fix.seq.is_multiple_of(MENDED_EVERY) {
+        if fused.verdict == Verdict::Accepted && fix.is_mended() {
             belief.covariance = belief.covariance.made_definite();
         }
         Ok(fused)
@@ -335,9 +334,6 @@ fn is_within(vector: &Vector3<f64>, limit: f64) -> bool {
     })
 }
 
-/// Every so many fixes of a sender the covariance is looked at, and mended if rounding has made it indefinite: far more
-/// often than it takes for that, and too seldom to be noticed in the time of an update.
-const MENDED_EVERY: u64 = 16;
 /// Beyond this, m, an estimate is not of this world: the filter has diverged.
 const MAX_POSITION_M: f64 = 1e10;
 /// Likewise, m/s.

@@ -29,6 +29,9 @@ pub fn belief_of<G: InertialState<D>, S: Side, const D: usize>(
             "the state is of another model: this daemon runs the model imu"
         });
     }
+    if state.parameter_count != 0 {
+        return Err("the state has parameters of mismatches, and the model imu has none");
+    }
     let rotation = checked_attitude(state)?;
     let pose = SE23 {
         rotation,

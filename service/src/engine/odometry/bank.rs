@@ -1,17 +1,21 @@
 //! Mismatches of unknown behaviour: the adaptive bank of augmented filters.
 
 use inekf::filter::{
-    Adaptive, Belief, Left, Mode, STANDARD_MODES, Switching, UpdateError, UpdateOptions, Verdict,
+    Adaptive, Belief, Covariance, Left, Mode, STANDARD_MODES, Switching, UpdateError,
+    UpdateOptions, Verdict,
 };
 use inekf::model::{Augmented, OdometryStep, Points, Unknowns};
+use inekf_shared::message::{MODES, StateVector};
 use nalgebra::SMatrix;
 
 use super::super::model::Fused;
 use super::super::recovery::Widening;
 use super::doubted;
 use super::filter::{PoseFilter, Report};
-use super::learning::{bits, pose, report};
+use super::learning::{bits, pose, recalled, report, write_learned};
 use super::vehicle::Vehicle;
+
+const _: () = assert!(STANDARD_MODES == MODES, "a state has room for every weight");
 
 /// A bank of filters with P parameters beside the pose, A in all.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +57,39 @@ where
             merged: bank.estimate(),
             active: 0,
         }
+    }
+
+    fn recall(
+        &self,
+        prior: &Belief<G, Left, D>,
+        state: &StateVector,
+    ) -> Result<Self::State, &'static str> {
+        let belief = recalled(prior, state, self.parameters)?;
+        let weights = state.mode_weights;
+        let total: f64 = weights.iter().sum();
+        if state.mode_count as usize != STANDARD_MODES
+            || !weights.iter().all(|weight| *weight >= 0.0)
+            || !(total.is_finite() && total > 0.0)
+        {
+            return Err("the weights of the modes are no weights: nine numbers that add up to one");
+        }
+        let bank = Adaptive::resumed(&belief, weights, self.modes, self.switching, self.options);
+        Ok(BankState {
+            bank,
+            merged: bank.estimate(),
+            active: 0,
+        })
+    }
+
+    fn write_learned(&self, state: &Self::State, vector: &mut StateVector) {
+        write_learned(&state.merged, self.parameters, vector);
+        vector.mode_count = STANDARD_MODES as u32;
+        vector.mode_weights = *state.bank.weights();
+    }
+
+    fn mend(&self, state: &mut Self::State) {
+        state.bank = state.bank.with_covariances(Covariance::made_definite);
+        state.merged = state.bank.estimate();
     }
 
     fn advance(&self, state: &mut Self::State, step: &OdometryStep<G>, q: &SMatrix<f64, D, D>) {

@@ -4,7 +4,7 @@ use core::fmt::Debug;
 
 use inekf::filter::{Belief, Left, UpdateError, UpdateOptions};
 use inekf::model::{OdometryStep, Points};
-use inekf_shared::message::{MAX_MISMATCHES, NO_MODE};
+use inekf_shared::message::{MAX_MISMATCHES, NO_MODE, StateVector};
 use nalgebra::SMatrix;
 
 use super::super::model::Fused;
@@ -40,6 +40,30 @@ pub trait PoseFilter<G, const D: usize, const N: usize>: Debug {
 
     /// The state that starts from `prior`.
     fn begin(&self, prior: &Belief<G, Left, D>) -> Self::State;
+
+    /// The state that starts from `prior` with what `state`, whose pose it is, has learned beside it. A filter that learns
+    /// nothing knows no such state.
+    ///
+    /// # Errors
+    /// A sentence that names the fault and the remedy.
+    fn recall(
+        &self,
+        prior: &Belief<G, Left, D>,
+        state: &StateVector,
+    ) -> Result<Self::State, &'static str> {
+        let _ = (prior, state);
+        Err(
+            "the state has parameters of mismatches, and this daemon estimates none: set their number to 0",
+        )
+    }
+
+    /// Writes what was learned beside the pose.
+    fn write_learned(&self, state: &Self::State, vector: &mut StateVector) {
+        let _ = (state, vector);
+    }
+
+    /// Makes the covariance definite if rounding has made it indefinite.
+    fn mend(&self, state: &mut Self::State);
 
     /// Moves the state by one step of odometry with the noise covariance `q`.
     fn advance(&self, state: &mut Self::State, step: &OdometryStep<G>, q: &SMatrix<f64, D, D>);

@@ -6,11 +6,12 @@ use inekf::filter::{
 };
 use inekf::lie::LieGroup;
 use inekf::model::{Augmented, OdometryStep, Points, Unknowns};
-use inekf_shared::message::MAX_MISMATCHES;
+use inekf_shared::message::{MAX_MISMATCHES, StateVector};
 use nalgebra::{SMatrix, SVector};
 
 use super::super::model::Fused;
 use super::super::recovery::Widening;
+use super::super::set_state::is_positive_semidefinite;
 use super::doubted;
 use super::filter::{PoseFilter, Report};
 use super::vehicle::Vehicle;
@@ -64,6 +65,65 @@ pub fn pose<G: LieGroup<D>, const D: usize, const P: usize, const A: usize>(
     Belief::new(belief.mean.pose, Covariance::from_upper(own.into_owned()))
 }
 
+/// Writes the first `count` parameters of an augmented belief, and their covariance, into a state whose pose it is.
+pub fn write_learned<G, const D: usize, const P: usize, const A: usize>(
+    belief: &Belief<Augmented<G, D, P, A>, Left, A>,
+    count: usize,
+    state: &mut StateVector,
+) {
+    let p = belief.covariance.matrix();
+    let count = count.min(P).min(MAX_MISMATCHES);
+    state.parameter_count = count as u32;
+    let mut entries = state.parameter_covariance.iter_mut();
+    for k in 0..count {
+        state.parameters[k] = belief.mean.parameters[k];
+        for (row, entry) in (0..=D + k).zip(entries.by_ref()) {
+            *entry = p[(row, D + k)];
+        }
+    }
+}
+
+/// The augmented belief that `state` describes, whose pose is that of `prior`.
+///
+/// # Errors
+/// A sentence that names the fault and the remedy.
+pub fn recalled<G: LieGroup<D>, const D: usize, const P: usize, const A: usize>(
+    prior: &Belief<G, Left, D>,
+    state: &StateVector,
+    count: usize,
+) -> Result<Belief<Augmented<G, D, P, A>, Left, A>, &'static str> {
+    if state.parameter_count as usize != count.min(P) || state.dimension as usize != D {
+        return Err(
+            "the state has other mismatches than this daemon's: set the number of its parameters to 0 to begin with the configured ones",
+        );
+    }
+    let count = count.min(P).min(MAX_MISMATCHES);
+    let mut p = SMatrix::<f64, A, A>::zeros();
+    p.fixed_view_mut::<D, D>(0, 0)
+        .copy_from(prior.covariance.matrix());
+    let mut parameters = SVector::<f64, P>::zeros();
+    let mut entries = state.parameter_covariance.iter();
+    for k in 0..count {
+        parameters[k] = state.parameters[k];
+        for (row, entry) in (0..=D + k).zip(entries.by_ref()) {
+            p[(row, D + k)] = *entry;
+        }
+    }
+    let covariance = Covariance::from_upper(p);
+    if !parameters.iter().chain(p.iter()).all(|x| x.is_finite()) {
+        return Err("the state has a parameter of a mismatch that is not finite");
+    }
+    if !is_positive_semidefinite(covariance.matrix()) {
+        return Err(
+            "the covariance with the parameters of mismatches is not positive semidefinite",
+        );
+    }
+    Ok(Belief::new(
+        Augmented::new(prior.mean, parameters),
+        covariance,
+    ))
+}
+
 /// One bit for each of `count` mismatches.
 pub fn bits(count: usize) -> u32 {
     (1 << count.min(MAX_MISMATCHES)) - 1
@@ -90,6 +150,25 @@ where
             ),
             active: 0,
         }
+    }
+
+    fn recall(
+        &self,
+        prior: &Belief<G, Left, D>,
+        state: &StateVector,
+    ) -> Result<Self::State, &'static str> {
+        Ok(LearningState {
+            belief: recalled(prior, state, self.parameters)?,
+            active: 0,
+        })
+    }
+
+    fn write_learned(&self, state: &Self::State, vector: &mut StateVector) {
+        write_learned(&state.belief, self.parameters, vector);
+    }
+
+    fn mend(&self, state: &mut Self::State) {
+        state.belief.covariance = state.belief.covariance.made_definite();
     }
 
     fn advance(&self, state: &mut Self::State, step: &OdometryStep<G>, q: &SMatrix<f64, D, D>) {

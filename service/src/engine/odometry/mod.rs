@@ -8,7 +8,7 @@
 
 use core::fmt::Debug;
 
-use inekf::filter::{Alignment, Belief, Covariance, UpdateError};
+use inekf::filter::{Alignment, Belief, Covariance, UpdateError, Verdict};
 use inekf::lie::SO3;
 use inekf_shared::message::{
     EstimateMessage, PositionFix, ProcessNoise, REASON_NOT_FINITE, REASON_OUT_OF_RANGE,
@@ -186,7 +186,11 @@ where
                 );
             }
         };
-        Ok(self.filter.begin(&Belief::new(mean, covariance)))
+        let prior = Belief::new(mean, covariance);
+        match state.parameter_count {
+            0 => Ok(self.filter.begin(&prior)),
+            _ => self.filter.recall(&prior, state),
+        }
     }
 
     fn motion(&self, _before: Option<&Row<D>>, row: &Row<D>, interval_ns: u64) -> RowMotion<G, D> {
@@ -225,7 +229,7 @@ where
         gated: bool,
     ) -> Result<Fused, UpdateError> {
         let options = self.fusion.options(gated);
-        match fix.measurement {
+        let fused = match fix.measurement {
             Sighting::One(source, one) => {
                 let points = sighting::points::<1, N, N>([one]);
                 self.filter.fuse(state, &[source], &points, &options)
@@ -234,7 +238,11 @@ where
                 let points = sighting::points::<2, N, PAIR>(both);
                 self.filter.fuse(state, &sources, &points, &options)
             }
+        }?;
+        if fused.verdict == Verdict::Accepted && fix.is_mended() {
+            self.filter.mend(state);
         }
+        Ok(fused)
     }
 
     fn widening(&self, state: &F::State, fix: &Fix<Sighting<N>>, nis: f64) -> Widening {
@@ -273,7 +281,9 @@ where
     }
 
     fn snapshot(&self, stamp_ns: u64, state: &F::State) -> StateVector {
-        snapshot(stamp_ns, &self.filter.belief(state))
+        let mut vector = snapshot(stamp_ns, &self.filter.belief(state));
+        self.filter.write_learned(state, &mut vector);
+        vector
     }
 }
 

@@ -139,6 +139,10 @@ where
         }
     }
 
+    fn mend(&self, state: &mut Self::State) {
+        state.belief.covariance = state.belief.covariance.made_definite();
+    }
+
     fn advance(&self, state: &mut Self::State, step: &OdometryStep<G>, q: &SMatrix<f64, D, D>) {
         state.belief = inekf::filter::propagate_odometry(&state.belief, step, q);
         if self.gain == Gain::Constrained {

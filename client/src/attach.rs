@@ -1,0 +1,188 @@
+//! Ports that attach anew after somebody removed their files.
+//!
+//! Shared memory that is mapped stays usable after its file was removed, and nothing fails: a feeder then sends, and a
+//! reader listens, to nobody, for a daemon that opens its ports anew does so under new files. So when nothing goes or
+//! comes, and then at most every quarter of a second, the files of the services are looked at: if one has gone, or is
+//! another than it was, the ports are let go of and opened again, as often as it takes. As long as messages flow nothing
+//! is looked at. The look is some system calls; opening takes as long as it did the first time.
+
+use inekf_shared::clock::monotonic_ns;
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::{self, Config, Node, TransportError, Watched};
+
+/// Time between two looks, nanoseconds.
+const PERIOD_NS: u64 = 250_000_000;
+/// Looks at the clock are at most this many calls apart.
+const MOST_APART: u32 = 1024;
+
+/// How a kind of ports is opened.
+type Open<P> = fn(&Node, &Instance) -> Result<P, TransportError>;
+
+/// Ports P of one instance, and the node that they were made on.
+pub(crate) struct Attached<P> {
+    /// None while they cannot be opened.
+    ports: Option<Live<P>>,
+    open: Open<P>,
+    instance: Instance,
+    name: &'static str,
+    config: Config,
+    looked_ns: u64,
+    /// Whether something went or came since.
+    heard: bool,
+    /// How often they were opened anew.
+    times: u64,
+}
+
+struct Live<P> {
+    ports: P,
+    watched: Watched,
+    // After the ports, which were made on it.
+    node: Node,
+}
+
+impl<P> Attached<P> {
+    /// Opens the ports on `node`; `name` is that of the nodes that follow.
+    pub(crate) fn open(
+        node: Node,
+        name: &'static str,
+        instance: &Instance,
+        open: Open<P>,
+    ) -> Result<Self, TransportError> {
+        let config = node.config().clone();
+        Ok(Self {
+            ports: Some(Live::open(node, instance, open)?),
+            open,
+            instance: instance.clone(),
+            name,
+            config,
+            looked_ns: monotonic_ns(),
+            heard: false,
+            times: 0,
+        })
+    }
+
+    /// The ports, unless they are being opened anew.
+    pub(crate) fn ports(&mut self) -> Option<&mut P> {
+        self.ports.as_mut().map(|live| &mut live.ports)
+    }
+
+    /// How often they were opened anew.
+    pub(crate) fn times(&self) -> u64 {
+        self.times
+    }
+
+    /// Notes that something goes or comes: all is well.
+    pub(crate) fn heard(&mut self) {
+        self.heard = true;
+    }
+
+    /// To be called when nothing goes or comes, `now_ns` being CLOCK_MONOTONIC: attaches anew if that is why.
+    #[cold]
+    pub(crate) fn look(&mut self, now_ns: u64) {
+        if now_ns.saturating_sub(self.looked_ns) < PERIOD_NS {
+            return;
+        }
+        self.looked_ns = now_ns;
+        if core::mem::take(&mut self.heard) {
+            return;
+        }
+        match self.ports.take() {
+            Some(live) if live.watched.is_intact() => {
+                self.ports = Some(live);
+                return;
+            }
+            Some(live) => live.let_go(),
+            None => {}
+        }
+        // What does not work now is tried at the next look: whoever holds the old files may let go of them meanwhile.
+        let opened = transport::open_node_with(self.name, &self.config)
+            .and_then(|node| Live::open(node, &self.instance, self.open));
+        self.ports = opened.ok();
+        self.times += u64::from(self.ports.is_some());
+        // Opening may have taken long.
+        self.looked_ns = monotonic_ns();
+    }
+}
+
+impl<P> Live<P> {
+    fn open(node: Node, instance: &Instance, open: Open<P>) -> Result<Self, TransportError> {
+        let ports = open(&node, instance)?;
+        Ok(Self {
+            watched: Watched::services_of(&node)?,
+            ports,
+            node,
+        })
+    }
+
+    /// Lets go of the old ports. The last user of a service removes its files by name: if others have made new ones of
+    /// the same name since, the old ones are kept until the process ends.
+    fn let_go(self) {
+        if self.watched.is_replaced() {
+            core::mem::forget((self.ports, self.node));
+        }
+    }
+}
+
+/// Looks at the clock now and then only: about as often as a look at the files is due, however often it is asked.
+#[derive(Debug)]
+pub(crate) struct Seldom {
+    left: u32,
+    apart: u32,
+    last_ns: u64,
+}
+
+impl Seldom {
+    /// Asks the clock at the first call.
+    pub(crate) const fn new() -> Self {
+        Self {
+            left: 1,
+            apart: 1,
+            last_ns: 0,
+        }
+    }
+
+    /// CLOCK_MONOTONIC, nanoseconds, every so many calls.
+    pub(crate) fn now_ns(&mut self) -> Option<u64> {
+        self.left -= 1;
+        if self.left > 0 {
+            return None;
+        }
+        let now_ns = monotonic_ns();
+        let quickly = now_ns.saturating_sub(self.last_ns) < PERIOD_NS / 8;
+        self.apart = if quickly {
+            (2 * self.apart).min(MOST_APART)
+        } else {
+            (self.apart / 16).max(1)
+        };
+        self.left = self.apart;
+        self.last_ns = now_ns;
+        Some(now_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use super::*;
+
+    #[test]
+    fn the_clock_is_asked_seldom_by_who_calls_often_and_each_time_by_who_calls_seldom() {
+        let mut seldom = Seldom::new();
+        let asked = (0..100_000).filter(|_| seldom.now_ns().is_some()).count();
+        assert!(asked < 1000, "{asked} of 100000");
+        // Once a while has passed without a call it comes down to every call again.
+        let started = Instant::now();
+        let mut calls = 0;
+        while seldom.apart > 1 {
+            calls += 1;
+            seldom.now_ns();
+            std::thread::sleep(Duration::from_nanos(PERIOD_NS / 8 / u64::from(MOST_APART)));
+            assert!(started.elapsed() < Duration::from_secs(60));
+            if calls > 3 * MOST_APART {
+                std::thread::sleep(Duration::from_nanos(PERIOD_NS / 8));
+            }
+        }
+        assert!(seldom.now_ns().is_some());
+    }
+}

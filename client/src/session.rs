@@ -1,5 +1,6 @@
 //! One client's whole conversation with a daemon: feeding, reading and requesting.
 
+use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
@@ -22,6 +23,8 @@ const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 /// Inputs in flight at most when nothing may be lost: each may give two estimates, and the
 /// reader's buffer holds 1024.
 const IN_FLIGHT: usize = 256;
+/// Estimates handed over for each row that is sent: as many as a row may give.
+const HANDED_OVER_PER_ROW: usize = 2;
 /// And at most this long a stretch of data: the daemon holds back a fix that is ahead of the
 /// samples, but not one so far ahead that its clock seems wrong.
 const IN_FLIGHT_NS: u64 = 10_000_000_000;
@@ -58,6 +61,8 @@ pub struct Session<E: Estimate = EstimateSe23> {
     controller: Controller,
     in_flight: usize,
     settled_ns: u64,
+    /// Estimates that have come and are not handed over yet.
+    waiting: VecDeque<E>,
 }
 
 impl<E: Estimate> Session<E> {
@@ -76,6 +81,7 @@ impl<E: Estimate> Session<E> {
             controller,
             in_flight: 0,
             settled_ns: 0,
+            waiting: VecDeque::with_capacity(HANDED_OVER_PER_ROW * IN_FLIGHT),
         })
     }
 
@@ -102,7 +108,7 @@ impl<E: Estimate> Session<E> {
     }
 
     /// Sends one row so that nothing is lost: after every so many rows it waits until the daemon
-    /// has processed them, and hands the estimates that came to `take`.
+    /// has processed them, and hands the estimates that came to `take` while the daemon works on the next ones.
     ///
     /// # Errors
     /// As [`Session::send`], or the daemon does not answer, or an estimate was lost.
@@ -114,13 +120,36 @@ impl<E: Estimate> Session<E> {
         let stamp_ns = event.stamp_ns();
         let stretch_ns = stamp_ns.saturating_sub(self.settled_ns);
         if self.in_flight >= IN_FLIGHT || (self.in_flight > 0 && stretch_ns > IN_FLIGHT_NS) {
-            self.settle(take)?;
+            self.await_processed()?;
+            self.collect()?;
         }
         if self.in_flight == 0 {
             self.settled_ns = stamp_ns;
         }
         self.send(event)?;
         self.in_flight += 1;
+        let count = self.waiting.len().min(HANDED_OVER_PER_ROW);
+        self.waiting.drain(..count).try_for_each(take)
+    }
+
+    /// Waits until everything sent has been processed.
+    fn await_processed(&mut self) -> anyhow::Result<ControlResponse> {
+        let response = self.controller.barrier()?;
+        self.in_flight = 0;
+        Ok(response)
+    }
+
+    /// Gets the estimates that have come. Never waits.
+    fn collect(&mut self) -> anyhow::Result<()> {
+        while let Some(estimate) = self.reader.next_estimate()? {
+            self.waiting.push_back(estimate);
+        }
+        if self.reader.missed() > 0 {
+            bail!(
+                "{} estimates were lost: this process was held up for too long",
+                self.reader.missed()
+            );
+        }
         Ok(())
     }
 
@@ -132,8 +161,7 @@ impl<E: Estimate> Session<E> {
         &mut self,
         take: &mut impl FnMut(E) -> anyhow::Result<()>,
     ) -> anyhow::Result<ControlResponse> {
-        let response = self.controller.barrier()?;
-        self.in_flight = 0;
+        let response = self.await_processed()?;
         self.take_estimates(take)?;
         Ok(response)
     }
@@ -146,16 +174,8 @@ impl<E: Estimate> Session<E> {
         &mut self,
         take: &mut impl FnMut(E) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        while let Some(estimate) = self.reader.next_estimate()? {
-            take(estimate)?;
-        }
-        if self.reader.missed() > 0 {
-            bail!(
-                "{} estimates were lost: this process was held up for too long",
-                self.reader.missed()
-            );
-        }
-        Ok(())
+        self.collect()?;
+        self.waiting.drain(..).try_for_each(take)
     }
 
     /// The requests, for what a session does not ask itself.

@@ -116,7 +116,8 @@ impl Report {
             text,
             "\n{} of {} chunks left out: the placement of the processors changed during them.\n\
              ~ noise dominates the figure (the JSON says why); the maximum is a single round.\n\
-             inside: p50 of the daemon's own part, from the sample in hand to its estimate sent.\n",
+             inside: p50 of the daemon's own part, from the sample in hand to its estimate sent.\n\
+             halts/s: rounds 10 µs longer than their median, for each second of rounds.\n",
             self.left_out(),
             self.chunks(),
         );
@@ -163,7 +164,8 @@ impl Report {
             };
             let _ = writeln!(
                 lines,
-                "{inside:>10}{:>9.1}{by_echo:>9}{:>9}",
+                "{inside:>10}{:>9.0}{:>9.1}{by_echo:>9}{:>9}",
+                it.halts_per_s(),
                 it.ratio_to_raw(),
                 it.rounds.len()
             );
@@ -173,8 +175,18 @@ impl Report {
         }
         let title = format!("{}, {}, {}", wait.name(), pace.name(), placement.name());
         format!(
-            "\n{title}\n{:<28}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>9}{:>9}{:>9}\n{lines}",
-            "", "p50", "p99", "p99.9", "p99.99", "max", "inside", "/ line", "/ echo", "rounds"
+            "\n{title}\n{:<28}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>9}{:>9}{:>9}{:>9}\n{lines}",
+            "",
+            "p50",
+            "p99",
+            "p99.9",
+            "p99.99",
+            "max",
+            "inside",
+            "halts/s",
+            "/ line",
+            "/ echo",
+            "rounds"
         )
     }
 
@@ -239,6 +251,7 @@ impl Report {
             ("placement".to_owned(), placement.name().into()),
             ("chunks".to_owned(), it.chunks().into()),
             ("count".to_owned(), it.rounds.len().into()),
+            ("halts_per_s".to_owned(), it.halts_per_s().into()),
             ("missed".to_owned(), it.missed.into()),
             ("preempted".to_owned(), it.preempted.into()),
             ("noise".to_owned(), noise.into()),

@@ -21,6 +21,8 @@ pub const FIGURES: [(&str, f64); 5] = [
     ("max", 1.0),
 ];
 
+/// A round that much longer than the median was stopped by something else.
+const HALT_NS: u64 = 10_000;
 /// A quantile needs so many rounds beyond it to be more than chance.
 const ROUNDS_BEYOND: f64 = 10.0;
 /// The middle half of the chunks may differ by this factor.
@@ -141,6 +143,19 @@ impl Distribution {
     /// A quantile by that of another distribution.
     pub fn ratio_to(&self, base: &Self, quantile: f64) -> f64 {
         self.figure(quantile) as f64 / base.figure(quantile).max(1) as f64
+    }
+
+    /// Rounds that took [`HALT_NS`] longer than the median, for each second of rounds: what stops the machine now and
+    /// then, timer ticks above all, stops all mechanisms about as often in a second, and the longer round more often.
+    pub fn halts_per_s(&self) -> f64 {
+        let limit = self.figure(MEDIAN) + HALT_NS;
+        let slow = self.rounds.iter_recorded();
+        let halts: u64 = slow
+            .filter(|value| value.value_iterated_to() > limit)
+            .map(|value| value.count_at_value())
+            .sum();
+        let seconds = self.rounds.mean() * self.rounds.len() as f64 * 1e-9;
+        halts as f64 / seconds
     }
 
     /// Whether noise dominates a quantile, and why.
@@ -281,6 +296,16 @@ mod tests {
         assert_eq!((at.missed, at.preempted), (3, 6));
         assert_eq!(at.figure(MEDIAN), 1000);
         assert_eq!(at.ratio_to_raw(), 10.0);
+        assert_eq!(at.halts_per_s(), 0.0);
+    }
+
+    #[test]
+    fn halts_are_counted_by_the_time_that_they_fall_in() {
+        let rounds = chunk(&[(1000, 900), (100_000, 1)], &[(100, 1)]);
+        let row = row(&[&rounds]);
+        let at = row.at(Placement::SeparateCores).expect("a chunk");
+        // One in a millisecond of rounds, to the histogram's three digits.
+        assert!((at.halts_per_s() / 1000.0 - 1.0).abs() < 2e-3);
     }
 
     #[test]

@@ -308,7 +308,7 @@ INEKF_CHECK(offsetof(InekfSmoothedState, gyro_bias_rps) == 120);
 INEKF_CHECK(offsetof(InekfSmoothedState, accel_bias_mps2) == 144);
 INEKF_CHECK(offsetof(InekfSmoothedState, covariance) == 168);
 
-#define INEKF_HEALTH_TYPE "inekf.Health.v3"
+#define INEKF_HEALTH_TYPE "inekf.Health.v4"
 typedef struct InekfHealth {
     INEKF_TYPE_NAME(INEKF_HEALTH_TYPE)
     uint64_t stamp_ns;
@@ -326,8 +326,12 @@ typedef struct InekfHealth {
     uint64_t checkpoints;
     uint64_t checkpoint_failures;
     uint64_t journal_failures;
+    uint64_t last_fix_stamp_ns;
+    uint64_t last_delivery_ns;
+    uint64_t fused_stamp_ns[24];
+    uint64_t delivered_ns[24];
 } InekfHealth;
-INEKF_CHECK(sizeof(InekfHealth) == 304);
+INEKF_CHECK(sizeof(InekfHealth) == 704);
 INEKF_CHECK(INEKF_ALIGN(InekfHealth) == 8);
 INEKF_CHECK(offsetof(InekfHealth, stamp_ns) == 0);
 INEKF_CHECK(offsetof(InekfHealth, uptime_ns) == 8);
@@ -344,8 +348,12 @@ INEKF_CHECK(offsetof(InekfHealth, received) == 232);
 INEKF_CHECK(offsetof(InekfHealth, checkpoints) == 280);
 INEKF_CHECK(offsetof(InekfHealth, checkpoint_failures) == 288);
 INEKF_CHECK(offsetof(InekfHealth, journal_failures) == 296);
+INEKF_CHECK(offsetof(InekfHealth, last_fix_stamp_ns) == 304);
+INEKF_CHECK(offsetof(InekfHealth, last_delivery_ns) == 312);
+INEKF_CHECK(offsetof(InekfHealth, fused_stamp_ns) == 320);
+INEKF_CHECK(offsetof(InekfHealth, delivered_ns) == 512);
 
-#define INEKF_STATE_VECTOR_TYPE "inekf.StateVector.v1"
+#define INEKF_STATE_VECTOR_TYPE "inekf.StateVector.v2"
 typedef struct InekfStateVector {
     INEKF_TYPE_NAME(INEKF_STATE_VECTOR_TYPE)
     uint32_t model;
@@ -357,8 +365,13 @@ typedef struct InekfStateVector {
     double gyro_bias_rps[3];
     double accel_bias_mps2[3];
     double covariance[120];
+    uint32_t parameter_count;
+    uint32_t mode_count;
+    double parameters[6];
+    double parameter_covariance[57];
+    double mode_weights[9];
 } InekfStateVector;
-INEKF_CHECK(sizeof(InekfStateVector) == 1104);
+INEKF_CHECK(sizeof(InekfStateVector) == 1688);
 INEKF_CHECK(INEKF_ALIGN(InekfStateVector) == 8);
 INEKF_CHECK(offsetof(InekfStateVector, model) == 0);
 INEKF_CHECK(offsetof(InekfStateVector, dimension) == 4);
@@ -369,6 +382,11 @@ INEKF_CHECK(offsetof(InekfStateVector, p_w_m) == 72);
 INEKF_CHECK(offsetof(InekfStateVector, gyro_bias_rps) == 96);
 INEKF_CHECK(offsetof(InekfStateVector, accel_bias_mps2) == 120);
 INEKF_CHECK(offsetof(InekfStateVector, covariance) == 144);
+INEKF_CHECK(offsetof(InekfStateVector, parameter_count) == 1104);
+INEKF_CHECK(offsetof(InekfStateVector, mode_count) == 1108);
+INEKF_CHECK(offsetof(InekfStateVector, parameters) == 1112);
+INEKF_CHECK(offsetof(InekfStateVector, parameter_covariance) == 1160);
+INEKF_CHECK(offsetof(InekfStateVector, mode_weights) == 1616);
 
 #define INEKF_PROCESS_NOISE_TYPE "inekf.ProcessNoise.v1"
 typedef struct InekfProcessNoise {
@@ -397,7 +415,7 @@ INEKF_CHECK(offsetof(InekfProcessNoise, rotation_per_sqrt_m) == 48);
 INEKF_CHECK(offsetof(InekfProcessNoise, rotation_per_sqrt_rad) == 56);
 INEKF_CHECK(offsetof(InekfProcessNoise, translation_per_sqrt_m) == 64);
 
-#define INEKF_CONTROL_REQUEST_TYPE "inekf.ControlRequest.v2"
+#define INEKF_CONTROL_REQUEST_TYPE "inekf.ControlRequest.v3"
 typedef struct InekfControlRequest {
     INEKF_TYPE_NAME(INEKF_CONTROL_REQUEST_TYPE)
     uint32_t kind;
@@ -407,16 +425,16 @@ typedef struct InekfControlRequest {
     InekfProcessNoise noise;
     uint8_t input[136];
 } InekfControlRequest;
-INEKF_CHECK(sizeof(InekfControlRequest) == 1328);
+INEKF_CHECK(sizeof(InekfControlRequest) == 1912);
 INEKF_CHECK(INEKF_ALIGN(InekfControlRequest) == 8);
 INEKF_CHECK(offsetof(InekfControlRequest, kind) == 0);
 INEKF_CHECK(offsetof(InekfControlRequest, argument) == 4);
 INEKF_CHECK(offsetof(InekfControlRequest, request_id) == 8);
 INEKF_CHECK(offsetof(InekfControlRequest, state) == 16);
-INEKF_CHECK(offsetof(InekfControlRequest, noise) == 1120);
-INEKF_CHECK(offsetof(InekfControlRequest, input) == 1192);
+INEKF_CHECK(offsetof(InekfControlRequest, noise) == 1704);
+INEKF_CHECK(offsetof(InekfControlRequest, input) == 1776);
 
-#define INEKF_CONTROL_RESPONSE_TYPE "inekf.ControlResponse.v4"
+#define INEKF_CONTROL_RESPONSE_TYPE "inekf.ControlResponse.v5"
 typedef struct InekfControlResponse {
     INEKF_TYPE_NAME(INEKF_CONTROL_RESPONSE_TYPE)
     uint64_t request_id;
@@ -432,7 +450,7 @@ typedef struct InekfControlResponse {
     uint64_t config_len;
     InekfStateVector state;
 } InekfControlResponse;
-INEKF_CHECK(sizeof(InekfControlResponse) == 1624);
+INEKF_CHECK(sizeof(InekfControlResponse) == 2208);
 INEKF_CHECK(INEKF_ALIGN(InekfControlResponse) == 8);
 INEKF_CHECK(offsetof(InekfControlResponse, request_id) == 0);
 INEKF_CHECK(offsetof(InekfControlResponse, status) == 8);
@@ -447,16 +465,16 @@ INEKF_CHECK(offsetof(InekfControlResponse, smoothed) == 504);
 INEKF_CHECK(offsetof(InekfControlResponse, config_len) == 512);
 INEKF_CHECK(offsetof(InekfControlResponse, state) == 520);
 
-#define INEKF_JOURNAL_ENTRY_TYPE "inekf.JournalEntry.v1"
+#define INEKF_JOURNAL_ENTRY_TYPE "inekf.JournalEntry.v2"
 typedef struct InekfJournalEntry {
     INEKF_TYPE_NAME(INEKF_JOURNAL_ENTRY_TYPE)
     uint64_t index;
     uint64_t estimates;
     uint32_t kind;
     uint32_t size;
-    uint8_t payload[1328];
+    uint8_t payload[1912];
 } InekfJournalEntry;
-INEKF_CHECK(sizeof(InekfJournalEntry) == 1352);
+INEKF_CHECK(sizeof(InekfJournalEntry) == 1936);
 INEKF_CHECK(INEKF_ALIGN(InekfJournalEntry) == 8);
 INEKF_CHECK(offsetof(InekfJournalEntry, index) == 0);
 INEKF_CHECK(offsetof(InekfJournalEntry, estimates) == 8);

@@ -380,8 +380,12 @@ class Health(ctypes.Structure):
         ("checkpoints", ctypes.c_uint64),
         ("checkpoint_failures", ctypes.c_uint64),
         ("journal_failures", ctypes.c_uint64),
+        ("last_fix_stamp_ns", ctypes.c_uint64),
+        ("last_delivery_ns", ctypes.c_uint64),
+        ("fused_stamp_ns", ctypes.c_uint64 * 24),
+        ("delivered_ns", ctypes.c_uint64 * 24),
     ]
-    SIZE, ALIGN = 304, 8
+    SIZE, ALIGN = 704, 8
     OFFSETS = [
         ("stamp_ns", 0),
         ("uptime_ns", 8),
@@ -398,11 +402,15 @@ class Health(ctypes.Structure):
         ("checkpoints", 280),
         ("checkpoint_failures", 288),
         ("journal_failures", 296),
+        ("last_fix_stamp_ns", 304),
+        ("last_delivery_ns", 312),
+        ("fused_stamp_ns", 320),
+        ("delivered_ns", 512),
     ]
 
     @staticmethod
     def type_name():
-        return "inekf.Health.v3"
+        return "inekf.Health.v4"
 
 
 class StateVector(ctypes.Structure):
@@ -416,8 +424,13 @@ class StateVector(ctypes.Structure):
         ("gyro_bias_rps", ctypes.c_double * 3),
         ("accel_bias_mps2", ctypes.c_double * 3),
         ("covariance", ctypes.c_double * 120),
+        ("parameter_count", ctypes.c_uint32),
+        ("mode_count", ctypes.c_uint32),
+        ("parameters", ctypes.c_double * 6),
+        ("parameter_covariance", ctypes.c_double * 57),
+        ("mode_weights", ctypes.c_double * 9),
     ]
-    SIZE, ALIGN = 1104, 8
+    SIZE, ALIGN = 1688, 8
     OFFSETS = [
         ("model", 0),
         ("dimension", 4),
@@ -428,11 +441,16 @@ class StateVector(ctypes.Structure):
         ("gyro_bias_rps", 96),
         ("accel_bias_mps2", 120),
         ("covariance", 144),
+        ("parameter_count", 1104),
+        ("mode_count", 1108),
+        ("parameters", 1112),
+        ("parameter_covariance", 1160),
+        ("mode_weights", 1616),
     ]
 
     @staticmethod
     def type_name():
-        return "inekf.StateVector.v1"
+        return "inekf.StateVector.v2"
 
 
 class ProcessNoise(ctypes.Structure):
@@ -476,19 +494,19 @@ class ControlRequest(ctypes.Structure):
         ("noise", ProcessNoise),
         ("input", ctypes.c_uint8 * 136),
     ]
-    SIZE, ALIGN = 1328, 8
+    SIZE, ALIGN = 1912, 8
     OFFSETS = [
         ("kind", 0),
         ("argument", 4),
         ("request_id", 8),
         ("state", 16),
-        ("noise", 1120),
-        ("input", 1192),
+        ("noise", 1704),
+        ("input", 1776),
     ]
 
     @staticmethod
     def type_name():
-        return "inekf.ControlRequest.v2"
+        return "inekf.ControlRequest.v3"
 
 
 class ControlResponse(ctypes.Structure):
@@ -506,7 +524,7 @@ class ControlResponse(ctypes.Structure):
         ("config_len", ctypes.c_uint64),
         ("state", StateVector),
     ]
-    SIZE, ALIGN = 1624, 8
+    SIZE, ALIGN = 2208, 8
     OFFSETS = [
         ("request_id", 0),
         ("status", 8),
@@ -524,7 +542,7 @@ class ControlResponse(ctypes.Structure):
 
     @staticmethod
     def type_name():
-        return "inekf.ControlResponse.v4"
+        return "inekf.ControlResponse.v5"
 
 
 class JournalEntry(ctypes.Structure):
@@ -533,9 +551,9 @@ class JournalEntry(ctypes.Structure):
         ("estimates", ctypes.c_uint64),
         ("kind", ctypes.c_uint32),
         ("size", ctypes.c_uint32),
-        ("payload", ctypes.c_uint8 * 1328),
+        ("payload", ctypes.c_uint8 * 1912),
     ]
-    SIZE, ALIGN = 1352, 8
+    SIZE, ALIGN = 1936, 8
     OFFSETS = [
         ("index", 0),
         ("estimates", 8),
@@ -546,7 +564,7 @@ class JournalEntry(ctypes.Structure):
 
     @staticmethod
     def type_name():
-        return "inekf.JournalEntry.v1"
+        return "inekf.JournalEntry.v2"
 
 
 MESSAGES = [

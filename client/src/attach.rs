@@ -12,8 +12,10 @@ use inekf_shared::transport::{self, Config, Node, TransportError, Watched};
 
 /// Time between two looks, nanoseconds.
 const PERIOD_NS: u64 = 250_000_000;
-/// Looks at the clock are at most this many calls apart.
-const MOST_APART: u32 = 1024;
+/// Where looks at the clock should lie apart, nanoseconds.
+const APART_NS: u64 = PERIOD_NS / 8;
+/// They are at most this many calls apart.
+const MOST_APART: u64 = 64;
 
 /// How a kind of ports is opened.
 type Open<P> = fn(&Node, &Instance) -> Result<P, TransportError>;
@@ -126,8 +128,10 @@ impl<P> Live<P> {
 /// Looks at the clock now and then only: about as often as a look at the files is due, however often it is asked.
 #[derive(Debug)]
 pub(crate) struct Seldom {
-    left: u32,
-    apart: u32,
+    /// Calls until the next look.
+    left: u64,
+    /// Calls between the last two.
+    apart: u64,
     last_ns: u64,
 }
 
@@ -143,17 +147,17 @@ impl Seldom {
 
     /// CLOCK_MONOTONIC, nanoseconds, every so many calls.
     pub(crate) fn now_ns(&mut self) -> Option<u64> {
+        self.asked(monotonic_ns)
+    }
+
+    fn asked(&mut self, clock: impl FnOnce() -> u64) -> Option<u64> {
         self.left -= 1;
         if self.left > 0 {
             return None;
         }
-        let now_ns = monotonic_ns();
-        let quickly = now_ns.saturating_sub(self.last_ns) < PERIOD_NS / 8;
-        self.apart = if quickly {
-            (2 * self.apart).min(MOST_APART)
-        } else {
-            (self.apart / 16).max(1)
-        };
+        let now_ns = clock();
+        let took_ns = now_ns.saturating_sub(self.last_ns).max(1);
+        self.apart = (self.apart * APART_NS / took_ns).clamp(1, MOST_APART);
         self.left = self.apart;
         self.last_ns = now_ns;
         Some(now_ns)
@@ -162,27 +166,26 @@ impl Seldom {
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, Instant};
-
     use super::*;
 
     #[test]
     fn the_clock_is_asked_seldom_by_who_calls_often_and_each_time_by_who_calls_seldom() {
         let mut seldom = Seldom::new();
-        let asked = (0..100_000).filter(|_| seldom.now_ns().is_some()).count();
-        assert!(asked < 1000, "{asked} of 100000");
-        // Once a while has passed without a call it comes down to every call again.
-        let started = Instant::now();
-        let mut calls = 0;
-        while seldom.apart > 1 {
-            calls += 1;
-            seldom.now_ns();
-            std::thread::sleep(Duration::from_nanos(PERIOD_NS / 8 / u64::from(MOST_APART)));
-            assert!(started.elapsed() < Duration::from_secs(60));
-            if calls > 3 * MOST_APART {
-                std::thread::sleep(Duration::from_nanos(PERIOD_NS / 8));
-            }
-        }
-        assert!(seldom.now_ns().is_some());
+        let mut now_ns = 1_000_000_000_000;
+        let mut asked = |calls: u64, each_ns: u64| {
+            let looks = (0..calls).filter(|_| {
+                now_ns += each_ns;
+                seldom.asked(|| now_ns).is_some()
+            });
+            looks.count() as u64
+        };
+        // Spinning: every 64th call.
+        assert!((1560..1580).contains(&asked(100_000, 100)));
+        // Once a second: after what was left of the 64 each call.
+        asked(MOST_APART, 1_000_000_000);
+        assert_eq!(asked(100, 1_000_000_000), 100);
+        // A hundred times a second: every third.
+        asked(10, 10_000_000);
+        assert!((320..345).contains(&asked(1000, 10_000_000)));
     }
 }

@@ -8,6 +8,7 @@ use inekf::smoother::{
 };
 use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
+use crate::beside_batch::BesideBatch;
 use crate::common::{NOISE, assert_same_covariance, seeded};
 use crate::drive::{ANISOTROPIC, Drive, ISOTROPIC, LEVER_ARM_B, second};
 
@@ -22,41 +23,9 @@ fn assert_is_batch<G: InertialState<D>, S: Side, const D: usize>(
     jacobians: Jacobians,
 ) {
     let drive = Drive::<G, D>::new(12, 0.2, covariance_w, 11);
-    let options = WindowOptions {
-        first_prior: match jacobians {
-            Jacobians::Exact => PriorForm::Recentred,
-            Jacobians::Frozen => PriorForm::GroupMean,
-        },
-        jacobians,
-        ..WindowOptions::new(20)
-    };
-    let once = BatchOptions {
-        iterations: 1,
-        jacobians,
-        step_control: false,
-        ..BatchOptions::default()
-    };
-    let mut window = Window::<G, S, D>::new(&drive.first, &options);
-    let prior = Belief::<G, S, D>::from_left_covariance(drive.first.mean, drive.first.covariance);
-    let mut chain = Chain::with_capacity(prior, 20, 20);
-    let mut batch = Batch::<G, S, D, 3>::with_capacity(20, 20);
+    let mut beside = BesideBatch::<G, S, _, D, 3>::new(&drive.first, jacobians);
     for (motion, fix) in &drive.seconds {
-        let mut states: Vec<G> = window.states().copied().collect();
-        states.push(motion.transition(&states[states.len() - 1]).0);
-        batch.set_states(&states);
-        chain.advance(*motion, *motion.noise().matrix());
-        chain.observe(*fix);
-        batch.iterate(&chain, &once).expect("a step of the batch");
-
-        assert!(window.push(motion).is_none());
-        window.update(*fix).expect("an update");
-        assert_eq!(window.states().len(), batch.states().len());
-        for (actual, expected) in window.states().zip(batch.states()) {
-            let off = distance(actual, expected);
-            assert!(off < 1e-8, "{:?}: off by {off:e}", S::IS_LEFT);
-        }
-        let (actual, expected) = (window.newest().covariance, batch.newest_covariance());
-        assert_same_covariance("P", actual.matrix(), expected.matrix(), 1e-8);
+        beside.assert_same_step(motion, |_| *fix);
     }
 }
 

@@ -5,51 +5,19 @@ use inekf::lie::SE23;
 use inekf::model::{HeadingObservation, InertialState, NavState};
 use inekf::smoother::{Batch, BatchOptions, Chain, Jacobians, PriorForm, Window, WindowOptions};
 
+use crate::beside_batch::BesideBatch;
 use crate::common::assert_same_covariance;
 use crate::drive::{Drive, ISOTROPIC};
 
 /// Headings alone, one for each motion: what one iteration of the batch smoother does.
 fn assert_is_batch<G: InertialState<D>, S: Side, const D: usize>(jacobians: Jacobians) {
     let drive = Drive::<G, D>::new(10, 0.2, ISOTROPIC, 41);
-    let options = WindowOptions {
-        first_prior: match jacobians {
-            Jacobians::Exact => PriorForm::Recentred,
-            Jacobians::Frozen => PriorForm::GroupMean,
-        },
-        jacobians,
-        ..WindowOptions::new(20)
-    };
-    let once = BatchOptions {
-        iterations: 1,
-        jacobians,
-        step_control: false,
-        ..BatchOptions::default()
-    };
-    let mut window = Window::<G, S, D>::new(&drive.first, &options);
-    let prior = Belief::<G, S, D>::from_left_covariance(drive.first.mean, drive.first.covariance);
-    let mut chain = Chain::with_capacity(prior, 20, 20);
-    let mut batch = Batch::<G, S, D, 1>::with_capacity(20, 20);
+    let mut beside = BesideBatch::<G, S, _, D, 1>::new(&drive.first, jacobians);
     for (k, (motion, _)) in drive.seconds.iter().enumerate() {
-        let mut states: Vec<G> = window.states().copied().collect();
-        states.push(motion.transition(&states[states.len() - 1]).0);
-        let expected = states[states.len() - 1].pose().rotation.heading_rad();
-        let fix = HeadingObservation {
-            heading: expected + 0.2 * (k as f64 * 1.3).sin(),
+        beside.assert_same_step(motion, |expected| HeadingObservation {
+            heading: expected.pose().rotation.heading_rad() + 0.2 * (k as f64 * 1.3).sin(),
             sigma: 0.05,
-        };
-        batch.set_states(&states);
-        chain.advance(*motion, *motion.noise().matrix());
-        chain.observe(fix);
-        batch.iterate(&chain, &once).expect("a step of the batch");
-
-        assert!(window.push(motion).is_none());
-        window.update(fix).expect("an update");
-        for (actual, expected) in window.states().zip(batch.states()) {
-            let off = Left::difference(actual, expected).norm();
-            assert!(off < 1e-8, "fix {k}: off by {off:e}");
-        }
-        let (actual, expected) = (window.newest().covariance, batch.newest_covariance());
-        assert_same_covariance("P", actual.matrix(), expected.matrix(), 1e-8);
+        });
     }
 }
 

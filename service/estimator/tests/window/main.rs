@@ -9,6 +9,7 @@
 mod common;
 
 mod align_straight;
+mod beside_batch;
 mod biased;
 #[path = "../common/counting.rs"]
 mod counting;

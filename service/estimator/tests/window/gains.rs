@@ -3,9 +3,7 @@
 use inekf::filter::{Belief, Covariance, Forster, Gtsam, Left, Right, Side, UpdateOptions, update};
 use inekf::lie::SE23;
 use inekf::model::{ImuNoise, InertialState, NavState, PositionObservation, VelocityObservation};
-use inekf::smoother::{
-    Batch, BatchOptions, Chain, Fix, Jacobians, PriorForm, Window, WindowOptions,
-};
+use inekf::smoother::{Fix, Jacobians, PriorForm, Window, WindowOptions};
 use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
 use crate::beside_batch::BesideBatch;

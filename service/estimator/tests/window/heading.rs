@@ -1,9 +1,9 @@
 //! Fixes of the heading in the window: against the batch smoother, and among fixes of position.
 
-use inekf::filter::{Belief, Forster, Left, Side, UpdateOptions, update};
+use inekf::filter::{Forster, Left, Side, UpdateOptions, update};
 use inekf::lie::SE23;
 use inekf::model::{HeadingObservation, InertialState, NavState};
-use inekf::smoother::{Batch, BatchOptions, Chain, Jacobians, PriorForm, Window, WindowOptions};
+use inekf::smoother::{Jacobians, Window, WindowOptions};
 
 use crate::beside_batch::BesideBatch;
 use crate::common::assert_same_covariance;

@@ -54,7 +54,9 @@ fn a_sample_that_was_held_up_is_late_in_delivery_and_not_older_in_itself() {
 fn each_source_has_an_age_by_its_stamps_and_another_by_its_deliveries() {
     const STEP_NS: u64 = 10_000_000;
     const BEHIND_NS: u64 = 300_000_000;
-    let config = format!("{CONFIG}degraded_after_s = 2.0\n[[position_source]]\nid = 0\n[[position_source]]\nid = 1\n");
+    let config = format!(
+        "{CONFIG}degraded_after_s = 2.0\n[[position_source]]\nid = 0\n[[position_source]]\nid = 1\n"
+    );
     let scene = Scene::with_config(&config);
     let daemon = scene.daemon();
     let mut link = Link::open(&scene.memory, "car");

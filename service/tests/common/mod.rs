@@ -139,7 +139,7 @@ pub fn state_of(estimate: &EstimateSe23) -> StateVector {
         gyro_bias_rps: estimate.gyro_bias_rps,
         accel_bias_mps2: estimate.accel_bias_mps2,
         covariance: estimate.covariance,
-        ..StateVector::ZERO
+        ..StateVector::default()
     }
 }
 

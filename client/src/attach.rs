@@ -116,12 +116,17 @@ impl<P> Live<P> {
         })
     }
 
-    /// Lets go of the old ports. The last user of a service removes its files by name: if others have made new ones of
-    /// the same name since, the old ones are kept until the process ends.
+    /// Lets go of the old ports, and of nothing that others have made in their place since.
     fn let_go(self) {
-        if self.watched.is_replaced() {
-            core::mem::forget((self.ports, self.node));
-        }
+        let Self {
+            ports,
+            watched,
+            node,
+        } = self;
+        watched.sparing_others(|| {
+            drop(ports);
+            drop(node);
+        });
     }
 }
 

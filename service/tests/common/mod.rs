@@ -17,7 +17,7 @@ use inekf_service::engine::tally::Tally;
 use inekf_service::engine::{InertialEngine, Outbox, Settings};
 use inekf_shared::message::{
     EstimateSe23, Header, HeadingFix, ImuSample, MODEL_IMU, PositionFix, REASONS, StateVector,
-    VelocityFix, Zero, triangle_index,
+    VelocityFix, triangle_index,
 };
 use nalgebra::DMatrix;
 
@@ -139,7 +139,7 @@ pub fn state_of(estimate: &EstimateSe23) -> StateVector {
         gyro_bias_rps: estimate.gyro_bias_rps,
         accel_bias_mps2: estimate.accel_bias_mps2,
         covariance: estimate.covariance,
-        ..StateVector::ZERO
+        ..StateVector::default()
     }
 }
 

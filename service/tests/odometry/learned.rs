@@ -4,8 +4,7 @@ use inekf_shared::message::{StateVector, triangle_index};
 use nalgebra::DMatrix;
 
 use super::harness::{
-    Estimate, Input, PERIOD, SIGMAS, START, fix, named, planar_state, plane, run, space,
-    spatial_state,
+    Estimate, Input, PERIOD, START, fix, named, planar_state, plane, run, space, spatial_state,
 };
 
 /// The filters that learn.

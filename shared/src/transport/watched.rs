@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use super::inspect::SHARED_MEMORY;
 use super::sweep::{ids, process_of, service_id};
 use super::{Node, TransportError};
+use crate::clock::monotonic_ns;
 
 /// The files without which nobody can attach: the node's own, the services' that it has open, and its ports' data.
 #[derive(Clone, Debug, Default)]
@@ -106,11 +107,33 @@ impl Watched {
         self.0.iter().all(|file| file.is_there() == Some(true))
     }
 
-    /// Whether others lie in the place of some: who lets go of the old ones would remove those.
-    #[must_use]
-    pub fn is_replaced(&self) -> bool {
-        self.0.iter().any(|file| file.is_there() == Some(false))
+    /// Runs `let_go`, which ends the use of these files, and puts back what others have made of the same name since: the
+    /// last user of a service removes its description by name.
+    pub fn sparing_others<T>(&self, let_go: impl FnOnce() -> T) -> T {
+        let others = self.0.iter().filter(|file| file.is_there() == Some(false));
+        let aside: Vec<(&Path, PathBuf)> = others
+            .filter_map(|file| {
+                let aside = aside(&file.path);
+                // What cannot be put aside is made anew by its owner, who looks after it as well.
+                fs::hard_link(&file.path, &aside).ok()?;
+                Some((file.path.as_path(), aside))
+            })
+            .collect();
+        let done = let_go();
+        for (path, aside) in aside {
+            // Fails where there is one, as there should be.
+            let _ = fs::hard_link(&aside, path);
+            let _ = fs::remove_file(&aside);
+        }
+        done
     }
+}
+
+/// A name beside `path` that nobody else uses, and that is none of a service.
+fn aside(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(format!(".aside.{}.{}", std::process::id(), monotonic_ns()));
+    PathBuf::from(name)
 }
 
 fn names(folder: &Path) -> Result<Vec<String>, TransportError> {

@@ -102,7 +102,8 @@ impl Scene {
     /// Asserts that `doctor` leaves nothing, which it returns.
     pub fn cleared(&self) -> usize {
         let after = self.files_after_doctor();
-        assert_eq!(after, 0, "files are left");
+        let left = || [self.memory.shared_files(), self.memory.root_files()].concat();
+        assert_eq!(after, 0, "files are left: {:#?}", left());
         after
     }
 

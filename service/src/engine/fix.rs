@@ -2,6 +2,8 @@
 
 use core::fmt::Debug;
 
+#[cfg(doc)]
+use inekf_shared::message::ZERO_VELOCITY_SOURCE;
 use nalgebra::{Matrix3, Vector3};
 
 /// What a fix measures. The order breaks ties between equal stamps.
@@ -13,10 +15,12 @@ pub enum FixKind {
     Velocity = 1,
     /// Heading.
     Heading = 2,
+    /// A velocity of zero that the engine proposes itself.
+    Standstill = 3,
 }
 
 impl FixKind {
-    /// Number of kinds.
+    /// Number of kinds that have sources: all but what the engine makes itself.
     pub const COUNT: usize = 3;
 }
 
@@ -51,7 +55,7 @@ pub struct Antenna {
 pub struct Fix<Z> {
     /// Time of the measurement, nanoseconds of the sensor clock.
     pub stamp_ns: u64,
-    /// Id of the source, below `MAX_SOURCES`.
+    /// Id of the source, below `MAX_SOURCES`; [`ZERO_VELOCITY_SOURCE`] if there is none.
     pub source: u32,
     /// The source that was stacked with it, if one was.
     pub partner: Option<u32>,
@@ -67,9 +71,12 @@ impl<Z: Measurement> Fix<Z> {
         self.measurement.kind()
     }
 
-    /// Messages that it is made of.
+    /// Messages that it is made of: none, if the engine has made it.
     pub fn count(&self) -> u64 {
-        1 + u64::from(self.partner.is_some())
+        match self.kind() {
+            FixKind::Standstill => 0,
+            _ => 1 + u64::from(self.partner.is_some()),
+        }
     }
 
     /// What orders fixes: time, kind, source, number. A log therefore gives the same estimates

@@ -99,6 +99,13 @@ fn leading(triangle: &[f64], dimension: usize) -> Option<Vec<f64>> {
 }
 
 /// The band that holds 95 % of chi-square values: 2.5 % lie below it, 2.5 % above.
+///
+/// ```
+/// use inekf_client::consistency::band_95;
+///
+/// let (low, high) = band_95(3);
+/// assert!((low - 0.216).abs() < 1e-3 && (high - 9.348).abs() < 1e-3);
+/// ```
 #[must_use]
 pub fn band_95(degrees: usize) -> (f64, f64) {
     (
@@ -109,6 +116,13 @@ pub fn band_95(degrees: usize) -> (f64, f64) {
 
 /// The value below which a chi-square number with `degrees` of freedom, 1 or more, lies with `probability`: by
 /// bisection, to 1e-9 of its value.
+///
+/// ```
+/// use inekf_client::consistency::chi_square_quantile;
+///
+/// // With two degrees of freedom it is -2 ln(1 - p).
+/// assert!((chi_square_quantile(2, 0.95) + 2.0 * 0.05_f64.ln()).abs() < 1e-9);
+/// ```
 #[must_use]
 pub fn chi_square_quantile(degrees: usize, probability: f64) -> f64 {
     let (mut low, mut high) = (0.0, degrees.max(1) as f64);

@@ -51,6 +51,19 @@ const MAX_CONFIG_LEN: usize = 1 << 20;
 /// Sends requests and waits for their answers.
 ///
 /// If somebody removes the files in shared memory it attaches anew by itself at a later request.
+///
+/// ```no_run
+/// use std::time::Duration;
+///
+/// use inekf_client::control::Controller;
+/// use inekf_shared::topic::Instance;
+///
+/// // A daemon has to run.
+/// let mut daemon = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
+/// println!("at {:?}", daemon.snapshot()?.p_w_m);
+/// daemon.reset()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Controller {
     ports: Attached<Ports>,
     next_id: u64,

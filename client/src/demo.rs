@@ -86,6 +86,20 @@ impl Latencies {
 
 /// Runs the demo and prints what came of it.
 ///
+/// ```no_run
+/// use inekf_client::demo::{DemoOptions, demo};
+/// use inekf_client::simulate::Scenario;
+///
+/// demo(&DemoOptions {
+///     scenario: Scenario::RoadCircuit,
+///     seed: 1,
+///     rate_hz: 500.0,
+///     duration_s: 30.0,
+///     out: "demo-report".into(),
+/// })?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// The daemon cannot be started, or the report not be written.
 pub fn demo(options: &DemoOptions) -> anyhow::Result<()> {

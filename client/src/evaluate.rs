@@ -4,6 +4,24 @@
 //! to `(-pi, pi]`, attitude as the angle of `R_true^T R_hat`. The truth is interpolated at the
 //! estimate's stamps, linearly in position and velocity and along the shortest arc in attitude; it
 //! is never extrapolated, and not interpolated over gaps longer than the caller allows.
+//!
+//! ```
+//! use inekf_client::evaluate::{DEFAULT_MAX_GAP_NS, Pose, Trajectory, errors, summarise};
+//! use nalgebra::{UnitQuaternion, Vector3};
+//!
+//! let drive = |off_m: f64| {
+//!     let pose = |i: u64| Pose {
+//!         stamp_ns: i * 10_000_000,
+//!         q_wb: UnitQuaternion::identity(),
+//!         v_w_mps: None,
+//!         p_w_m: Vector3::new(i as f64 * 0.1, off_m, 0.0),
+//!     };
+//!     Trajectory::new((0..100).map(pose).collect())
+//! };
+//! let errors = errors(&drive(0.3), &drive(0.0), DEFAULT_MAX_GAP_NS);
+//! let summary = summarise(&errors, 0).expect("they have time in common");
+//! assert!((summary.position_rmse_m - Vector3::new(0.0, 0.3, 0.0)).norm() < 1e-12);
+//! ```
 
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -283,6 +301,20 @@ pub struct Deviations {
 ///
 /// Position: `R P_pp R^T`. Heading: the turn about the world's vertical, `(R P_rr R^T)_zz`, which is
 /// the heading's variance while the body x axis is near the horizon.
+///
+/// ```
+/// use inekf_client::evaluate::deviations;
+/// use inekf_client::table::{EstimateRow, EstimateState};
+///
+/// // Turned to north, with 3 m along the body and 1 m across: 1 m east, 3 m north.
+/// let row = EstimateRow {
+///     stamp_ns: 0,
+///     state: EstimateState::Plane { theta_rad: 90_f64.to_radians(), p_w_m: [0.0; 2] },
+///     covariance: vec![0.01, 0.0, 0.0, 9.0, 0.0, 1.0],
+/// };
+/// let sigma = deviations(&row).expect("it has a covariance").position_m;
+/// assert!((sigma.x - 1.0).abs() < 1e-12 && (sigma.y - 3.0).abs() < 1e-12);
+/// ```
 pub fn deviations(row: &EstimateRow) -> Option<Deviations> {
     let pose = estimate_pose(row.stamp_ns, &row.state);
     let rotation = pose.q_wb.to_rotation_matrix();
@@ -321,6 +353,13 @@ pub fn deviations(row: &EstimateRow) -> Option<Deviations> {
 /// Normalised estimation error squared, `xi^T P^-1 xi`: chi-square with as many degrees of freedom
 /// as `error` has entries, if the filter is consistent. `covariance_triangle` is the upper triangle,
 /// row by row, in the order of `error`. `None` if the sizes differ or P is not positive definite.
+///
+/// ```
+/// use inekf_client::evaluate::nees;
+///
+/// // Two standard deviations off on one of two axes.
+/// assert_eq!(nees(&[2.0, 0.0], &[1.0, 0.0, 4.0]), Some(4.0));
+/// ```
 pub fn nees(error: &[f64], covariance_triangle: &[f64]) -> Option<f64> {
     let covariance = symmetric(covariance_triangle, error.len())?;
     let error = DVector::from_column_slice(error);
@@ -346,12 +385,27 @@ pub(crate) fn symmetric(triangle: &[f64], dimension: usize) -> Option<DMatrix<f6
 }
 
 /// Heading of the body x axis, rad, counter-clockwise from the world x axis, `(-pi, pi]`.
+///
+/// ```
+/// use inekf_client::evaluate::heading_rad;
+/// use nalgebra::UnitQuaternion;
+///
+/// // Counter-clockwise from east: 90 degrees is north.
+/// let north = UnitQuaternion::from_euler_angles(0.0, 0.0, 90_f64.to_radians());
+/// assert!((heading_rad(&north).to_degrees() - 90.0).abs() < 1e-9);
+/// ```
 pub fn heading_rad(q_wb: &UnitQuaternion<f64>) -> f64 {
     let nose_w = q_wb * Vector3::x();
     nose_w.y.atan2(nose_w.x)
 }
 
 /// The same angle in `(-pi, pi]`.
+///
+/// ```
+/// use inekf_client::evaluate::wrap_angle;
+///
+/// assert!((wrap_angle(350_f64.to_radians()) + 10_f64.to_radians()).abs() < 1e-12);
+/// ```
 pub fn wrap_angle(angle_rad: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     let wrapped = angle_rad.rem_euclid(turn);

@@ -42,6 +42,16 @@ pub enum InitialError {
 /// The set-state request for the initial state of a dataset; `None` if it names none. Without `P0_diag` its dimension
 /// is 0, and the daemon takes the covariance of its configuration.
 ///
+/// ```
+/// use inekf_client::dataset::Meta;
+/// use inekf_client::initial::state_vector;
+/// use inekf_client::model::Model;
+///
+/// // Without an initial state in meta.json the daemon starts as its configuration says.
+/// assert!(state_vector(&Meta::default(), Model::Imu)?.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`InitialError`] if state or variances are not those of `model`.
 pub fn state_vector(meta: &Meta, model: Model) -> Result<Option<StateVector>, InitialError> {

@@ -12,6 +12,19 @@
 //!
 //! Conventions everywhere: SI units and radians, world ENU, body FLU, quaternions Hamilton, body to world, stored
 //! `x, y, z, w`; stamps are `u64` nanoseconds of the sensor clock.
+//!
+//! ```
+//! use inekf_client::dataset::Dataset;
+//! use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+//!
+//! // A drive of two seconds, through a folder and back: no bit changes.
+//! let options = SimulationOptions { duration_s: 2.0, ..SimulationOptions::default() };
+//! let drive = simulate(Scenario::RoadCircuit, &options)?;
+//! let folder = tempfile::tempdir()?;
+//! drive.save(folder.path())?;
+//! assert_eq!(Dataset::load(folder.path())?.imu, drive.imu);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod attach;
 pub mod consistency;

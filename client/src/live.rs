@@ -21,6 +21,16 @@ pub struct LiveSummary {
 /// Feeds `dataset` to `instance` in real time, stamped with this machine's monotonic clock, until
 /// it ends or `stop` says so. The daemon may come and go meanwhile.
 ///
+/// ```no_run
+/// use inekf_client::live::feed_live;
+/// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+/// use inekf_shared::topic::Instance;
+///
+/// let drive = simulate(Scenario::RoadCircuit, &SimulationOptions::default())?;
+/// feed_live(&drive, &Instance::new("car")?, &|| false)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// A port cannot be opened or a sample not be sent.
 pub fn feed_live(

@@ -18,6 +18,15 @@ use inekf_shared::message::{
 use crate::table::{EstimateState, Layout};
 
 /// What a daemon estimates.
+///
+/// ```
+/// use inekf_client::model::Model;
+///
+/// for model in Model::ALL {
+///     assert_eq!(Model::from_code(model.code()), Some(model));
+/// }
+/// assert_eq!(Model::Odometry2d.to_string(), "odometry2d");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
     /// An IMU drives SE_2(3) with biases.

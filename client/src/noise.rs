@@ -21,6 +21,12 @@ pub fn load(path: &Path) -> anyhow::Result<ProcessNoise> {
 
 /// The same from the text of a configuration.
 ///
+/// ```
+/// let noise = "[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// assert!(inekf_client::noise::parse(noise).is_ok());
+/// assert!(inekf_client::noise::parse("model = 'imu'").is_err());
+/// ```
+///
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &str) -> anyhow::Result<ProcessNoise> {

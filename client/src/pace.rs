@@ -40,6 +40,16 @@ impl fmt::Display for Speed {
 const SPUN: Duration = Duration::from_micros(150);
 
 /// Maps stamps to deadlines on this machine's clock.
+///
+/// ```
+/// use std::time::Instant;
+///
+/// use inekf_client::pace::Pace;
+///
+/// // A hundred times as fast: a sample a second later is due in 10 ms.
+/// let pace = Pace::new(0, 100.0);
+/// assert!(pace.deadline(1_000_000_000) > Instant::now());
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     start: Instant,

@@ -58,6 +58,26 @@ pub struct ReplaySummary {
 
 /// Replays.
 ///
+/// ```no_run
+/// use std::path::Path;
+///
+/// use inekf_client::pace::Speed;
+/// use inekf_client::replay::{ReplayOptions, replay};
+/// use inekf_shared::topic::Instance;
+///
+/// replay(&ReplayOptions {
+///     dir: "flight".into(),
+///     config: Some("drone.toml".into()),
+///     speed: Speed::Max,
+///     out: "estimate.csv".into(),
+///     smoothed: None,
+///     covariance: true,
+///     instance: Instance::new("default")?,
+/// })?;
+/// assert!(Path::new("estimate.csv").is_file());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// The data cannot be read, the daemon not be started or reached, an estimate was lost, or none
 /// came; the error says which.

@@ -65,6 +65,33 @@ pub struct Built {
 
 /// Builds the report.
 ///
+/// ```
+/// use inekf_client::dataset::Truth;
+/// use inekf_client::report::{Material, build};
+/// use inekf_client::table::{EstimateRow, EstimateState};
+///
+/// let row = |i: u64| EstimateRow {
+///     stamp_ns: i * 1_000_000,
+///     state: EstimateState::Plane { theta_rad: 0.0, p_w_m: [i as f64, 0.0] },
+///     covariance: vec![],
+/// };
+/// let rows: Vec<EstimateRow> = (0..10).map(row).collect();
+/// let built = build(&Material {
+///     title: "A run",
+///     subtitle: "without truth",
+///     rows: &rows,
+///     truth: &Truth::None,
+///     fixes: &[],
+///     settled_s: 0.0,
+///     nis: &[],
+///     latencies: &[],
+///     latency_note: "",
+///     counters: None,
+/// })?;
+/// assert!(built.html.contains("<svg") && built.summary.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`PlotError`] if the drawing library fails.
 pub fn build(material: &Material<'_>) -> Result<Built, PlotError> {

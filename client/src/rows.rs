@@ -3,6 +3,23 @@
 //! One row per propagated sample, as it is after the updates due at that stamp: the last estimate of a
 //! stamp is the row, even if its fix was held back until the next sample came; an update between two
 //! samples has no row of its own.
+//!
+//! ```
+//! use inekf_client::rows::RowBuilder;
+//! use inekf_shared::message::{ESTIMATE_PROPAGATED, ESTIMATE_UPDATED, EstimateSe23, Zero};
+//!
+//! let estimate = |stamp_ns, flags| {
+//!     let mut estimate = EstimateSe23::ZERO;
+//!     (estimate.head.stamp_ns, estimate.head.flags) = (stamp_ns, flags);
+//!     estimate
+//! };
+//! let mut rows = RowBuilder::default();
+//! assert!(rows.push(estimate(10, ESTIMATE_PROPAGATED)).is_none());
+//! // The fix of the same stamp takes the row over.
+//! assert!(rows.push(estimate(10, ESTIMATE_UPDATED)).is_none());
+//! let row = rows.push(estimate(20, ESTIMATE_PROPAGATED)).expect("the row of 10 ns");
+//! assert_eq!((row.head.stamp_ns, row.head.flags), (10, ESTIMATE_UPDATED));
+//! ```
 
 use inekf_shared::message::{ESTIMATE_PROPAGATED, EstimateSe23};
 

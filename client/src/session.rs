@@ -31,6 +31,14 @@ const IN_FLIGHT_NS: u64 = 10_000_000_000;
 
 /// The model of the running daemon of `instance`.
 ///
+/// ```no_run
+/// use inekf_client::session::running_model;
+/// use inekf_shared::topic::Instance;
+///
+/// println!("it estimates {}", running_model(&Instance::new("car")?)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// No daemon answers, or it is of another version.
 pub fn running_model(instance: &Instance) -> anyhow::Result<Model> {

@@ -184,7 +184,8 @@ fn what_the_example_switches_off_can_be_switched_on() {
         .map(|key| key.name)
         .collect();
     assert!(!disabled.is_empty());
-    let on: Vec<&str> = disabled.iter().map(|name| &**name).collect();
+    let names = disabled.iter().map(|name| &**name);
+    let on: Vec<&str> = names.chain(["[zero_velocity]"]).collect();
     let all_on = switched(EXAMPLES[0], &["gyro_density", "accel_density"], &on)
         .replace("level = \"accelerometer\"", "level = \"given\"");
     let config = Config::from_toml_str(&all_on, "all on").unwrap();
@@ -198,6 +199,7 @@ fn what_the_example_switches_off_can_be_switched_on() {
             accel: 0.2
         }
     );
+    assert!(inertial.zero_velocity.is_some());
     assert_eq!(config.initial.level, Level::Given);
     assert_eq!(config.initial.position_m, Some([0.0; 3]));
     assert_eq!(config.update.gate_probability, Some(0.9999));
@@ -331,6 +333,7 @@ fn a_minimal_file_takes_the_documented_defaults() {
                 id: 0,
                 sigma_scale: 1.0,
             }],
+            zero_velocity: None,
         }),
         initial: Initial {
             heading_deg: 0.0,

@@ -1,6 +1,8 @@
 //! Fixes at their own stamps: the engine against the library called step by step, bit for bit.
 
 mod common;
+#[path = "engine_fixes/standstill.rs"]
+mod standstill;
 
 use common::{
     Direct, Engine, Input, PERIOD_NS, belief_bits, engine_at, feed, heading, input_of, lively_imu,

@@ -48,6 +48,16 @@ impl Memory {
         }
     }
 
+    /// The folder of iceoryx2's files.
+    pub fn root(&self) -> &Path {
+        self.root.path()
+    }
+
+    /// What the names of its files in `/dev/shm` start with.
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
     /// A node of this process's own.
     pub fn node(&self) -> Node {
         open_node_with("test", &self.config).expect("a node")

@@ -31,6 +31,12 @@ pub fn example(name: &str) -> PathBuf {
     executable(&built(&["--package=inekf-client", &chosen]), name)
 }
 
+/// The file of `inekf-bench`, built in the profile of this test.
+pub fn bench() -> PathBuf {
+    let messages = built(&["--bins", "--package=inekf-bench"]);
+    executable(&messages, "inekf-bench")
+}
+
 /// The library for C, as a file that programs are linked with and find at run time.
 pub fn c_library() -> PathBuf {
     let messages = built(&["--package=inekf-c"]);

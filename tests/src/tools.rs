@@ -1,7 +1,7 @@
 //! Tools that are not part of the project and may not be there: a test that needs one says that it skips.
 //!
-//! `INEKF_PYTHON` names the Python to use (default `python3`), such as that of a virtual environment with
-//! `pip install iceoryx2==0.10.* mcap mcap-ros2-support evo`. `ICEORYX2_CXX` names the folder where iceoryx2's C++
+//! `INEKF_PYTHON` names the Python to use (default `python3`); `bash .ci/python` makes one that has everything and prints
+//! its path. `ICEORYX2_CXX` names the folder where iceoryx2's C++
 //! bindings are installed.
 
 use std::ffi::OsString;
@@ -26,7 +26,7 @@ pub fn python_with(modules: &[&str]) -> Option<OsString> {
         return Some(python);
     }
     println!(
-        "skipped: {} cannot import {}; name one that can in {PYTHON}",
+        "skipped: {} cannot import {}; export {PYTHON}=\"$(bash .ci/python)\"",
         python.display(),
         modules.join(", ")
     );

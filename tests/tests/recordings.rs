@@ -1,6 +1,9 @@
 //! The accuracy that is promised on real recordings, through the real `inekf-client replay` and daemon, with the
 //! configurations of the project. Needs the folder that `INEKF_DATASETS` names, and says that it skips without.
 
+#[path = "recordings/standstill.rs"]
+mod standstill;
+
 use std::path::Path;
 
 use inekf_client::dataset::read_truth;

@@ -8,12 +8,13 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use inekf_client::dataset::read_truth;
 use inekf_client::exchange::{flat, require_sorted, truth_table, tum};
+use inekf_client::recording::estimates;
 use inekf_client::table::{EstimateTable, read_estimates};
 
 /// What to export, and how.
 #[derive(Args)]
 pub struct Arguments {
-    /// An estimate CSV (of `replay --out`) or a truth.csv.
+    /// An estimate CSV (of `replay --out`), a recording (of `record`), or a truth.csv.
     input: PathBuf,
     /// tum: a line a pose, for evo; csv: seconds, degrees and world axes, for a spreadsheet; mcap: ROS 2 messages
     /// for Foxglove and rosbag2.
@@ -76,8 +77,12 @@ fn same_file(one: &Path, other: &Path) -> bool {
     matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
 }
 
-/// Reads an estimate CSV, or a truth, which has no biases in its header.
+/// Reads an estimate CSV, a recording, or a truth, which has no biases in its header.
 fn read(path: &Path) -> anyhow::Result<EstimateTable> {
+    let is_recording = estimates::is_recording(path);
+    if is_recording.with_context(|| format!("reading {}", path.display()))? {
+        return Ok(estimates::read_estimates(path)?.table);
+    }
     let text =
         std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
     let header = text.lines().next().unwrap_or_default();

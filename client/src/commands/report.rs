@@ -7,13 +7,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use inekf_client::dataset::{Dataset, Truth, read_truth};
-use inekf_client::report::{Built, Material, build};
-use inekf_client::table::read_estimates;
+use inekf_client::recording::estimates;
+use inekf_client::report::{Built, Material, NisSample, build};
+use inekf_client::table::{EstimateTable, read_estimates};
 
 /// What to report on.
 #[derive(Args)]
 pub struct Arguments {
-    /// An estimate CSV, of `replay --out FILE --covariance` for the bands and the NEES.
+    /// An estimate CSV, of `replay --out FILE --covariance` for the bands and the NEES; or a recording (of `record`),
+    /// which has the NIS of the fixes as well.
     input: PathBuf,
     /// A dataset folder with truth.csv, whose fixes are drawn too, or the file of a truth.
     #[arg(long, value_name = "DIR|FILE")]
@@ -35,8 +37,7 @@ pub struct Arguments {
 /// A file cannot be read or written, has faults, or truth and estimate have no time in common.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let name = arguments.input.display().to_string();
-    let file = File::open(&arguments.input).with_context(|| format!("reading {name}"))?;
-    let table = read_estimates(&name, BufReader::new(file))?;
+    let (table, nis) = estimate_of(&arguments.input)?;
     let dataset = truth_of(&arguments.truth)?;
     let subtitle = format!("{name} against {}", arguments.truth.display());
     let built = build(&Material {
@@ -46,7 +47,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         truth: &dataset.truth,
         fixes: &dataset.position,
         settled_s: arguments.skip,
-        nis: &[],
+        nis: &nis,
         latencies: &[],
         latency_note: "",
         counters: None,
@@ -69,6 +70,18 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     write(&arguments.out, &built)?;
     println!("report   {}", arguments.out.display());
     Ok(())
+}
+
+/// The estimates with the NIS of the fixes, which only a recording has.
+fn estimate_of(path: &Path) -> anyhow::Result<(EstimateTable, Vec<NisSample>)> {
+    let reading = || format!("reading {}", path.display());
+    if estimates::is_recording(path).with_context(reading)? {
+        let recorded = estimates::read_estimates(path)?;
+        return Ok((recorded.table, recorded.nis));
+    }
+    let file = File::open(path).with_context(reading)?;
+    let table = read_estimates(&path.display().to_string(), BufReader::new(file))?;
+    Ok((table, Vec::new()))
 }
 
 fn truth_of(path: &Path) -> anyhow::Result<Dataset> {

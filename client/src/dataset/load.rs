@@ -36,6 +36,20 @@ impl Default for LoadOptions {
 impl Dataset {
     /// Reads a dataset folder.
     ///
+    /// ```
+    /// use inekf_client::dataset::Dataset;
+    ///
+    /// let folder = tempfile::tempdir()?;
+    /// std::fs::write(folder.path().join("meta.json"), r#"{"name": "bench"}"#)?;
+    /// std::fs::write(folder.path().join("imu.csv"), "t_ns,gx,gy,gz,ax,ay,az\n10,0,0,0.1,0,0,9.81\n")?;
+    /// let dataset = Dataset::load(folder.path())?;
+    /// assert_eq!(dataset.imu[0].gyro_rps, [0.0, 0.0, 0.1]);
+    /// // A fault names file, line and column.
+    /// std::fs::write(folder.path().join("imu.csv"), "t_ns,gx,gy,gz,ax,ay,az\n10,0,0,fast,0,0,9.81\n")?;
+    /// assert!(Dataset::load(folder.path()).unwrap_err().to_string().contains("fast"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// See [`Dataset::load_with`].
     pub fn load(dir: impl AsRef<Path>) -> Result<Self, DatasetError> {
@@ -110,6 +124,16 @@ impl Dataset {
 }
 
 /// Reads one truth file by itself (`truth.csv`, `reference.csv`).
+///
+/// ```
+/// use inekf_client::dataset::{Truth, read_truth};
+///
+/// let file = tempfile::NamedTempFile::new()?;
+/// std::fs::write(file.path(), "t_ns,theta,x,y\n10,0.5,1,2\n")?;
+/// let Truth::Planar(rows) = read_truth(file.path())? else { panic!("it is of the plane") };
+/// assert_eq!(rows[0].p_w_m, [1.0, 2.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`DatasetError::File`] if it cannot be opened, [`DatasetError::Faults`] with every fault found.

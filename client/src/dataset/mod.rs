@@ -13,6 +13,23 @@
 //!
 //! One of `imu.csv` and `odometry.csv` is required, everything else is optional. Columns are found
 //! by name, others are ignored. `t_ns` is a whole number of nanoseconds of the sensor clock.
+//!
+//! ```
+//! use inekf_client::dataset::{Dataset, Event, ImuRow, PositionRow};
+//!
+//! let imu = |stamp_ns| ImuRow { stamp_ns, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.80665] };
+//! let fix = PositionRow {
+//!     stamp_ns: 15,
+//!     source: 0,
+//!     dimension: 3,
+//!     position_w_m: [1.0, 2.0, 3.0],
+//!     sigma_m: [0.5; 3],
+//! };
+//! let dataset = Dataset { imu: vec![imu(10), imu(20)], position: vec![fix], ..Dataset::default() };
+//! let stamps: Vec<u64> = dataset.events().map(|event| event.stamp_ns()).collect();
+//! assert_eq!(stamps, [10, 15, 20]);
+//! assert!(matches!(dataset.events().nth(1), Some(Event::Position(_))));
+//! ```
 
 mod events;
 mod fit;

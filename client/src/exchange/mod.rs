@@ -8,6 +8,23 @@
 //!
 //! All are written from an [`EstimateTable`], whose stamps increase; a table whose stamps do not is refused, because some
 //! of those tools take it without a word and compare the wrong poses.
+//!
+//! ```
+//! use inekf_client::exchange::tum;
+//! use inekf_client::table::{EstimateRow, EstimateState};
+//!
+//! let pose = EstimateRow {
+//!     stamp_ns: 1_500_000_000,
+//!     state: EstimateState::Plane { theta_rad: 0.0, p_w_m: [1.0, 2.0] },
+//!     covariance: vec![],
+//! };
+//! let mut text = Vec::new();
+//! tum::write(std::slice::from_ref(&pose), &mut text)?;
+//! assert!(text.starts_with(b"1.500000000 1.0 2.0 0.0 "));
+//! // What does not increase is refused.
+//! assert!(tum::write(&[pose.clone(), pose], &mut text).is_err());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #[cfg(feature = "mcap")]
 mod cdr;

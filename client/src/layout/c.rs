@@ -1,11 +1,17 @@
 //! The contract as a header for C (C11) and C++ (C++17): one struct a message, every offset asserted at compile time.
 //! For C++ each struct names itself in `IOX2_TYPE_NAME`, which iceoryx2's C++ bindings look for.
 
-use std::fmt::Write;
+use inekf_shared::message::Layout;
 
-use inekf_shared::message::{FieldType, Layout};
+use super::{CODES, LAYOUTS, Names, push};
 
-use super::{CODES, LAYOUTS, element};
+const NAMES: Names = Names {
+    u8: "uint8_t",
+    u32: "uint32_t",
+    u64: "uint64_t",
+    f64: "double",
+    prefix: "Inekf",
+};
 
 const HEAD: &str = "\
 /* The messages of the estimation daemon. Written by `inekf-client layout --c`: do not edit.
@@ -44,11 +50,6 @@ pub fn c() -> String {
     text
 }
 
-fn push(text: &mut String, line: std::fmt::Arguments<'_>) {
-    // Writing to a String cannot fail.
-    let _ = text.write_fmt(line);
-}
-
 fn push_struct(text: &mut String, layout: &Layout) {
     let Layout {
         name,
@@ -68,9 +69,8 @@ fn push_struct(text: &mut String, layout: &Layout) {
         ),
     );
     for field in *fields {
-        let (inner, counts) = element(field.holds);
+        let (of, counts) = NAMES.of(field.holds);
         let counts: String = counts.iter().map(|count| format!("[{count}]")).collect();
-        let of = element_name(inner);
         push(text, format_args!("    {of} {}{counts};\n", field.name));
     }
     push(text, format_args!("}} Inekf{name};\n"));
@@ -102,16 +102,4 @@ fn upper(name: &str) -> String {
         upper.push(letter.to_ascii_uppercase());
     }
     upper
-}
-
-fn element_name(holds: FieldType) -> String {
-    match holds {
-        FieldType::U8 => "uint8_t".to_owned(),
-        FieldType::U32 => "uint32_t".to_owned(),
-        FieldType::U64 => "uint64_t".to_owned(),
-        FieldType::F64 => "double".to_owned(),
-        FieldType::Struct(layout) => format!("Inekf{}", layout.name),
-        // `element` has taken the arrays off.
-        FieldType::Array(of, _) => element_name(*of),
-    }
 }

@@ -1,9 +1,16 @@
 //! The contract as JSON, for programs that write their own bindings.
 
-use inekf_shared::message::FieldType;
 use serde_json::{Map, Value, json};
 
-use super::{CODES, LAYOUTS, element};
+use super::{CODES, LAYOUTS, Names};
+
+const NAMES: Names = Names {
+    u8: "u8",
+    u32: "u32",
+    u64: "u64",
+    f64: "f64",
+    prefix: "",
+};
 
 /// An object with `messages` (name, type name, size, alignment, fields with offset, type and counts) and `codes`.
 #[must_use]
@@ -15,11 +22,11 @@ pub fn json() -> String {
                 .fields
                 .iter()
                 .map(|field| {
-                    let (inner, counts) = element(field.holds);
+                    let (of, counts) = NAMES.of(field.holds);
                     json!({
                         "name": field.name,
                         "offset": field.offset,
-                        "type": type_name(inner),
+                        "type": of,
                         "counts": counts,
                     })
                 })
@@ -38,16 +45,4 @@ pub fn json() -> String {
         .map(|(name, code)| ((*name).to_owned(), json!(code)))
         .collect();
     format!("{:#}\n", json!({ "messages": messages, "codes": codes }))
-}
-
-fn type_name(holds: FieldType) -> &'static str {
-    match holds {
-        FieldType::U8 => "u8",
-        FieldType::U32 => "u32",
-        FieldType::U64 => "u64",
-        FieldType::F64 => "f64",
-        FieldType::Struct(layout) => layout.name,
-        // `element` has taken the arrays off.
-        FieldType::Array(of, _) => type_name(*of),
-    }
 }

@@ -1,12 +1,18 @@
 //! The contract as a Python module: one `ctypes.Structure` a message, with the static `type_name()` that the package
 //! `iceoryx2` looks for.
 
-use std::fmt::Write;
-
-use inekf_shared::message::{FieldType, Layout};
+use inekf_shared::message::Layout;
 use inekf_shared::transport::{IPC_PREFIX_VARIABLE, IPC_ROOT_VARIABLE};
 
-use super::{CODES, LAYOUTS, element};
+use super::{CODES, LAYOUTS, Names, push};
+
+const NAMES: Names = Names {
+    u8: "ctypes.c_uint8",
+    u32: "ctypes.c_uint32",
+    u64: "ctypes.c_uint64",
+    f64: "ctypes.c_double",
+    prefix: "",
+};
 
 const HEAD: &str = r#""""The messages of the estimation daemon. Written by `inekf-client layout --python`: do not edit.
 
@@ -72,11 +78,6 @@ pub fn python() -> String {
     text
 }
 
-fn push(text: &mut String, line: std::fmt::Arguments<'_>) {
-    // Writing to a String cannot fail.
-    let _ = text.write_fmt(line);
-}
-
 fn push_class(text: &mut String, layout: &Layout) {
     let Layout {
         name,
@@ -90,7 +91,7 @@ fn push_class(text: &mut String, layout: &Layout) {
         format_args!("\n\nclass {name}(ctypes.Structure):\n    _fields_ = [\n"),
     );
     for field in *fields {
-        let (inner, counts) = element(field.holds);
+        let (of, counts) = NAMES.of(field.holds);
         // ctypes reads from the inside out: the innermost count comes first.
         let counts: String = counts
             .iter()
@@ -99,11 +100,7 @@ fn push_class(text: &mut String, layout: &Layout) {
             .collect();
         push(
             text,
-            format_args!(
-                "        (\"{}\", {}{counts}),\n",
-                field.name,
-                element_name(inner)
-            ),
+            format_args!("        (\"{}\", {of}{counts}),\n", field.name),
         );
     }
     push(
@@ -122,16 +119,4 @@ fn push_class(text: &mut String, layout: &Layout) {
             "    ]\n\n    @staticmethod\n    def type_name():\n        return \"{type_name}\"\n"
         ),
     );
-}
-
-fn element_name(holds: FieldType) -> &'static str {
-    match holds {
-        FieldType::U8 => "ctypes.c_uint8",
-        FieldType::U32 => "ctypes.c_uint32",
-        FieldType::U64 => "ctypes.c_uint64",
-        FieldType::F64 => "ctypes.c_double",
-        FieldType::Struct(layout) => layout.name,
-        // `element` has taken the arrays off.
-        FieldType::Array(of, _) => element_name(*of),
-    }
 }

@@ -5,8 +5,35 @@
 //! estimates, each in their own order. If its writer is killed or the disk is full, all but the last frame is good.
 //!
 //! * [`mod@write`]: the file as it grows; [`read`]: what there is of it, whatever its bytes are
+//! * [`estimates`]: its estimates as a table
 //! * [`mod@record`]: from a running daemon to a file; [`replay`]: from a file through a daemon of its own, and the comparison
+//!
+//! ```
+//! use inekf_client::recording::estimates::{is_recording, read_estimates};
+//! use inekf_client::recording::{Head, RECORDING_VERSION, Writer};
+//! use inekf_shared::message::{ESTIMATE_PROPAGATED, EstimateSe23, MODEL_IMU, Zero};
+//!
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("drive.rec");
+//! let head = Head {
+//!     version: RECORDING_VERSION,
+//!     model: MODEL_IMU,
+//!     instance: "car".to_owned(),
+//!     began_unix_s: 0,
+//!     config: "model = 'imu'".to_owned(),
+//! };
+//! let mut writer = Writer::create(&path, &head)?;
+//! let mut estimate = EstimateSe23::ZERO;
+//! (estimate.head.stamp_ns, estimate.head.flags, estimate.head.dimension) = (10, ESTIMATE_PROPAGATED, 15);
+//! writer.estimate(&estimate)?;
+//! writer.finish()?;
+//!
+//! assert!(is_recording(&path)?);
+//! assert_eq!(read_estimates(&path)?.table.rows[0].stamp_ns, 10);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+pub mod estimates;
 pub mod read;
 pub mod record;
 pub mod replay;

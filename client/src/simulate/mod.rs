@@ -8,6 +8,17 @@
 //! standard normal. Fixes carry white noise and are taken at their own stamps.
 //!
 //! Planar odometry is simulated by [`simulate_planar`].
+//!
+//! ```
+//! use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+//!
+//! let options = SimulationOptions { duration_s: 1.0, imu_rate_hz: 100.0, ..SimulationOptions::default() };
+//! let drive = simulate(Scenario::DroneLoops, &options)?;
+//! assert_eq!(drive.imu.len(), 101);
+//! // The same seed gives the same bytes.
+//! assert_eq!(drive, simulate(Scenario::DroneLoops, &options)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod choice;
 mod imu;

@@ -65,6 +65,14 @@ impl Scenario {
     }
 
     /// The motion at time `t_s`, seconds from the start of the simulation.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Scenario;
+    ///
+    /// // It stands for fifteen seconds before it drives off.
+    /// let car = Scenario::StandThenDrive;
+    /// assert_eq!(car.at(3.0).p_w_m, car.at(10.0).p_w_m);
+    /// ```
     pub fn at(self, t_s: f64) -> Kinematics {
         let time = Jet::time(t_s);
         match self {

@@ -10,6 +10,18 @@
 //! in body coordinates (`chi = chi_hat * exp(xi)`), ordered rotation, velocity, position, gyro
 //! bias, accelerometer bias (navigation); rotation, position (pose); theta, x, y (plane).
 //! Quaternions Hamilton, body to world; world ENU, body FLU; SI units.
+//!
+//! ```
+//! use inekf_client::table::{EstimateState, EstimateWriter, Layout, read_estimates};
+//!
+//! let mut writer = EstimateWriter::new(Vec::new(), Layout::Plane, None)?;
+//! let state = EstimateState::Plane { theta_rad: 0.5, p_w_m: [1.0, 0.1] };
+//! writer.write(1_000_000, &state, &[])?;
+//! let text = writer.finish()?;
+//! assert_eq!(String::from_utf8(text.clone())?, "t_ns,theta,x,y\n1000000,0.5,1.0,0.1\n");
+//! assert_eq!(read_estimates("plane.csv", &text[..])?.rows[0].state, state);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::io::{self, Read, Write};
 

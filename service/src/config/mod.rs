@@ -49,6 +49,7 @@ mod stacking;
 mod suggest;
 mod update;
 mod walk;
+mod zero_velocity;
 
 pub use choice::{
     Axis, Discretisation, Estimator, GapPolicy, HinfGain, Hold, Invariance, Jacobians, Level,
@@ -71,6 +72,7 @@ pub use sources::{HeadingSource, PositionSource, VelocitySource};
 pub use stacking::Stacking;
 pub use update::Update;
 pub use walk::KeySpec;
+pub use zero_velocity::ZeroVelocity;
 
 use estimator::Filter;
 use motion::{InertialTop, Tables};
@@ -141,7 +143,8 @@ impl Config {
         let smooths = filter.estimator == Estimator::Smoother && root.is_sound("estimator");
         let update = root.section("update", |update| Update::read(update, smooths));
         let position_sources = PositionSource::read_all(root, model);
-        let motion = Motion::read(root, model, top, tables);
+        let estimator = root.is_sound("estimator").then_some(filter.estimator);
+        let motion = Motion::read(root, model, estimator, top, tables);
 
         let ids: Vec<u32> = position_sources.iter().map(|source| source.id).collect();
         let known_ids = root.is_sound("position_source").then_some(&*ids);
@@ -161,7 +164,6 @@ impl Config {
                 stacking.as_ref(),
             );
         }
-        let estimator = root.is_sound("estimator").then_some(filter.estimator);
         Self {
             model: model.unwrap_or(Model::Imu),
             estimator: filter.estimator,

@@ -1,12 +1,13 @@
 //! What moves the estimate between measurements: an IMU or odometry, and everything that only one of them has.
 
-use super::choice::{Discretisation, Hold, Model};
+use super::choice::{Discretisation, Estimator, Hold, Model};
 use super::imu::Imu;
 use super::interval::Interval;
 use super::noise::{self, InertialNoise, OdometryNoise};
 use super::odometry::Rows;
 use super::section::Section;
 use super::sources::{HeadingSource, VelocitySource};
+use super::zero_velocity::ZeroVelocity;
 
 /// Why a key of inertial navigation is refused.
 pub(super) const ONLY_IMU: &str = "only for model \"imu\": remove it";
@@ -42,6 +43,8 @@ pub struct Inertial {
     pub velocity_sources: Vec<VelocitySource>,
     /// The sensors of heading, each with its own id.
     pub heading_sources: Vec<HeadingSource>,
+    /// Zero-velocity detection, if it is wanted.
+    pub zero_velocity: Option<ZeroVelocity>,
 }
 
 /// Motion by odometry.
@@ -117,11 +120,15 @@ impl Motion {
     pub(super) fn read(
         root: &mut Section<'_, '_>,
         model: Option<Model>,
+        estimator: Option<Estimator>,
         top: InertialTop,
         tables: Tables,
     ) -> Self {
         if model.is_some_and(Model::is_odometry) {
-            root.refuse_unread(&["velocity_source", "heading_source"], ONLY_IMU);
+            root.refuse_unread(
+                &["velocity_source", "heading_source", "zero_velocity"],
+                ONLY_IMU,
+            );
             return Self::Odometry(Odometry {
                 rows: tables.rows,
                 noise: tables.noise.1,
@@ -130,9 +137,11 @@ impl Motion {
         let noise = tables.noise.0;
         let velocity_sources = VelocitySource::read_all(root);
         let heading_sources = HeadingSource::read_all(root);
+        let zero_velocity = ZeroVelocity::read_if_given(root, estimator);
         Self::Inertial(Inertial {
             velocity_sources,
             heading_sources,
+            zero_velocity,
             ..Inertial::new(top, tables.imu, noise)
         })
     }
@@ -150,6 +159,7 @@ impl Inertial {
             noise,
             velocity_sources: Vec::new(),
             heading_sources: Vec::new(),
+            zero_velocity: None,
         }
     }
 }

@@ -202,6 +202,7 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         self.last_input = Some((stamp_ns, input));
         self.missing = 0;
         self.output.answer(header.seq, header.sent_ns, received_ns);
+        let proposed = self.model.propose(stamp_ns, &input);
         if self.history.newest().is_none() && !self.try_start(stamp_ns, &input) {
             return;
         }
@@ -214,6 +215,9 @@ impl<M: Model, H: History<M>> Engine<M, H> {
         {
             self.history.set_input(input);
             return;
+        }
+        if let Some(fix) = proposed {
+            self.insert(fix, outbox);
         }
         let Self {
             model,

@@ -2,6 +2,8 @@
 
 use core::fmt::Debug;
 
+#[cfg(doc)]
+use inekf_shared::message::ZERO_VELOCITY_SOURCE;
 use inekf_shared::message::{INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY};
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,17 +20,19 @@ pub enum FixKind {
     Velocity = 1,
     /// Heading.
     Heading = 2,
+    /// A velocity of zero that the engine proposes itself.
+    Standstill = 3,
 }
 
 impl FixKind {
-    /// Number of kinds.
+    /// Number of kinds that have sources: all but what the engine makes itself.
     pub const COUNT: usize = 3;
 
-    /// The `INPUT_*` index of its topic.
+    /// The `INPUT_*` index of its topic; a standstill is a velocity.
     pub const fn input(self) -> usize {
         match self {
             Self::Position => INPUT_POSITION,
-            Self::Velocity => INPUT_VELOCITY,
+            Self::Velocity | Self::Standstill => INPUT_VELOCITY,
             Self::Heading => INPUT_HEADING,
         }
     }
@@ -65,7 +69,7 @@ pub struct Antenna {
 pub struct Fix<Z> {
     /// Time of the measurement, nanoseconds of the sensor clock.
     pub stamp_ns: u64,
-    /// Id of the source, below `MAX_SOURCES`.
+    /// Id of the source, below `MAX_SOURCES`; [`ZERO_VELOCITY_SOURCE`] if there is none.
     pub source: u32,
     /// The source that was stacked with it, if one was.
     pub partner: Option<u32>,
@@ -86,9 +90,12 @@ impl<Z: Measurement> Fix<Z> {
         [Some(self.source), self.partner].into_iter().flatten()
     }
 
-    /// Messages that it is made of.
+    /// Messages that it is made of: none, if the engine has made it.
     pub fn count(&self) -> u64 {
-        1 + u64::from(self.partner.is_some())
+        match self.kind() {
+            FixKind::Standstill => 0,
+            _ => 1 + u64::from(self.partner.is_some()),
+        }
     }
 
     /// Whether the covariance is looked at after this one, and mended if rounding has made it indefinite. Chosen by the

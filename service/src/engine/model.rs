@@ -99,6 +99,13 @@ pub trait Model: Debug + Sized {
         Err(Refusal(REASON_WRONG_MODEL))
     }
 
+    /// Watches a sample, and proposes a fix at its stamp where the model finds one in the samples themselves. Called
+    /// once for each accepted sample, in order.
+    fn propose(&mut self, stamp_ns: u64, input: &Self::Input) -> Option<Fix<Self::Measurement>> {
+        let _ = (stamp_ns, input);
+        None
+    }
+
     /// The attitude to start from, once it is known; `input` is the sample at `stamp_ns`.
     fn attitude(&mut self, stamp_ns: u64, input: &Self::Input) -> Option<SO3>;
 

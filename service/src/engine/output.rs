@@ -131,7 +131,8 @@ impl<E: EstimateMessage> Output<E> {
                 }
                 self.tally.counters.accepted += fix.count();
                 self.last_aided_ns = self.last_aided_ns.max(fix.stamp_ns);
-                for source in fix.sources() {
+                // What the engine proposes itself is nobody's message.
+                for source in fix.sources().filter(|_| fix.count() > 0) {
                     let input = fix.kind().input();
                     self.tally.fused(input, source, fix.stamp_ns);
                 }

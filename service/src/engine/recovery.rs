@@ -65,6 +65,10 @@ impl Lockout {
         fix: &Fix<Z>,
         outcome: &Result<Fused, UpdateError>,
     ) -> Option<f64> {
+        // What the engine proposes itself is never forced on the state.
+        if fix.kind() == FixKind::Standstill {
+            return None;
+        }
         let in_a_row = &mut self.gated_in_a_row[fix.kind() as usize][fix.source as usize];
         match outcome {
             Ok(fused) if fused.verdict == Verdict::Gated => {

@@ -8,6 +8,7 @@ use inekf_shared::message::MAX_SOURCES;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fix::{Antenna, FixKind};
+use super::inertial::standstill::StandstillSettings;
 use super::resume::Doubt;
 use super::stack::{Missing, StackSettings};
 use crate::config::{
@@ -42,6 +43,8 @@ pub struct ImuSettings {
     pub gap_gyro_sigma: f64,
     /// Doubt about the mean specific force over a gap, m/s^2.
     pub gap_accel_sigma: f64,
+    /// When a vehicle stands, if that is looked for.
+    pub standstill: Option<StandstillSettings>,
 }
 
 impl InitialSettings {
@@ -284,6 +287,24 @@ fn imu(inertial: &Inertial) -> ImuSettings {
         },
         gap_gyro_sigma: GAP_GYRO_SIGMA,
         gap_accel_sigma: GAP_ACCEL_SIGMA,
+        standstill: inertial
+            .zero_velocity
+            .as_ref()
+            .map(|zero_velocity| standstill(zero_velocity, max_gap_ns)),
+    }
+}
+
+fn standstill(zero_velocity: &config::ZeroVelocity, max_gap_ns: u64) -> StandstillSettings {
+    StandstillSettings {
+        block_ns: zero_velocity.period_ns(),
+        blocks: (zero_velocity.after_s / zero_velocity.period_s).ceil() as u32,
+        gyro_std: zero_velocity.gyro_std_rps,
+        accel_std: zero_velocity.accel_std_mps2,
+        gyro_change: zero_velocity.gyro_change_rps,
+        accel_change: zero_velocity.accel_change_mps2,
+        speed: zero_velocity.speed_mps,
+        sigma: zero_velocity.sigma_mps,
+        max_gap_ns,
     }
 }
 

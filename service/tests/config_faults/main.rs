@@ -632,7 +632,13 @@ fn files_that_cannot_be_read_say_why() {
 #[test]
 fn each_fault_about_the_smoother() {
     let smoother = "estimator = \"smoother\"";
-    let cases: [(&str, &str, &str, &[&str]); 7] = [
+    let cases: [(&str, &str, &str, &[&str]); 8] = [
+        (
+            smoother,
+            "[zero_velocity]",
+            "zero_velocity",
+            &["not with estimator \"smoother\""],
+        ),
         (
             smoother,
             "[smoother]\nwindow = 0",

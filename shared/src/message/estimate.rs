@@ -44,6 +44,8 @@ pub const MODEL_ODOMETRY_2D: u32 = 3;
 
 /// The `source` of an estimate that no fix was fused into.
 pub const NO_SOURCE: u32 = u32::MAX;
+/// The source of a fix that the daemon has made itself: it found that the vehicle stands (`[zero_velocity]`).
+pub const ZERO_VELOCITY_SOURCE: u32 = u32::MAX - 1;
 
 /// The `mode` of an estimate that has none.
 pub const NO_MODE: u32 = u32::MAX;
@@ -124,7 +126,7 @@ pub struct EstimateHead {
     pub flags: u32,
     /// `STATE_*` code of the daemon.
     pub state: u32,
-    /// Source of the fix that was fused, [`NO_SOURCE`] if none was.
+    /// Source of the fix that was fused, [`NO_SOURCE`] if none was, [`ZERO_VELOCITY_SOURCE`] if it is the daemon's own.
     pub source: u32,
     /// Dimension of the covariance: 15 or 9 (SE_2(3)), 6 (SE(3)), 3 (SE(2)).
     pub dimension: u32,

@@ -37,7 +37,7 @@ pub use estimate::{
     Counters, ESTIMATE_DEGRADED, ESTIMATE_FLAGS, ESTIMATE_PROPAGATED, ESTIMATE_REPLAYED,
     ESTIMATE_RESET, ESTIMATE_RESUMED, ESTIMATE_SMOOTHED, ESTIMATE_UPDATED, EstimateHead,
     EstimateMessage, EstimateSe2, EstimateSe3, EstimateSe23, MODEL_IMU, MODEL_ODOMETRY_2D,
-    MODEL_ODOMETRY_3D, NO_MODE, NO_SOURCE, estimate_flag_name, model_name,
+    MODEL_ODOMETRY_3D, NO_MODE, NO_SOURCE, ZERO_VELOCITY_SOURCE, estimate_flag_name, model_name,
 };
 pub use header::Header;
 pub use heading::HeadingFix;

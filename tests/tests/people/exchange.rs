@@ -4,8 +4,12 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use inekf_client::recording::estimates::read_estimates;
+use inekf_client::recording::{Head, RECORDING_VERSION, Writer};
+use inekf_shared::message::{ESTIMATE_UPDATED, EstimateSe23, MODEL_IMU};
 use inekf_tests::drive;
 use inekf_tests::folder::Folder;
+use inekf_tests::in_process;
 use inekf_tests::memory::Memory;
 use inekf_tests::process::{Ended, Running, client};
 use inekf_tests::replay::replay;
@@ -146,6 +150,87 @@ fn the_public_reader_decodes_the_mcap_and_finds_the_estimates_in_it() {
     let ended = tools::finish(Running::start(command)).succeeded();
     let rows = estimates(&folder.path().join("estimate.csv")).len();
     assert_eq!(ended.stdout.trim(), format!("good {rows}"));
+}
+
+/// A folder with a recording of what the engine makes of a drive, as `drive.rec`, the same estimates as `estimate.csv`, and
+/// the truth.
+fn recorded() -> (Folder, Vec<EstimateSe23>) {
+    let dataset = drive::drive(5, 10.0);
+    let folder = Folder::of(&dataset);
+    let mut estimates = Vec::new();
+    in_process::run(&dataset, drive::CONFIG, &mut estimates);
+    let head = Head {
+        version: RECORDING_VERSION,
+        model: MODEL_IMU,
+        instance: "car".to_owned(),
+        began_unix_s: 0,
+        config: drive::CONFIG.to_owned(),
+    };
+    let mut writer = Writer::create(&folder.file("drive.rec"), &head).unwrap();
+    for estimate in &estimates {
+        writer.estimate(estimate).unwrap();
+    }
+    writer.finish().unwrap();
+    fs::write(
+        folder.file("estimate.csv"),
+        in_process::csv_of(&estimates, true),
+    )
+    .unwrap();
+    (folder, estimates)
+}
+
+#[test]
+fn a_recording_is_exported_as_its_estimate_csv_is() {
+    let (folder, _) = recorded();
+    for format in ["tum", "csv", "mcap"] {
+        let [of_csv, of_recording] =
+            [("estimate.csv", "a"), ("drive.rec", "b")].map(|(input, out)| {
+                let out = format!("{out}.{format}");
+                export(&folder, input, format, &out);
+                fs::read(folder.file(&out)).unwrap()
+            });
+        assert!(of_csv.len() > 1000 && of_csv == of_recording, "{format}");
+    }
+    // Without its last bytes it is exported as far as it goes.
+    let bytes = fs::read(folder.file("drive.rec")).unwrap();
+    fs::write(folder.file("torn.rec"), &bytes[..bytes.len() - 7]).unwrap();
+    export(&folder, "torn.rec", "tum", "torn.tum");
+    let lines = |name: &str| {
+        fs::read_to_string(folder.file(name))
+            .unwrap()
+            .lines()
+            .count()
+    };
+    assert!(lines("torn.tum") >= lines("a.tum") - 1);
+}
+
+#[test]
+fn a_report_on_a_recording_has_the_nis_of_its_fixes_and_one_on_a_csv_has_none() {
+    let (folder, estimates) = recorded();
+    let report = |input: &str, out: &str| {
+        let arguments = ["report", input, "--truth", "truth.csv", "--out", out];
+        let ended = run_in(folder.path(), &arguments).succeeded();
+        let page = fs::read_to_string(folder.file(out)).unwrap();
+        (ended.stdout.lines().next().unwrap().to_owned(), page)
+    };
+    let (of_recording, with) = report("drive.rec", "recording.html");
+    let (of_csv, without) = report("estimate.csv", "csv.html");
+    assert_eq!(of_recording, of_csv);
+    assert!(with.contains(">NIS<") && !without.contains(">NIS<"));
+    // One for each position fix that was judged: as many as the filter counted, with velocities and headings beside.
+    let nis = read_estimates(&folder.file("drive.rec")).unwrap().nis;
+    let updated = |estimate: &&EstimateSe23| estimate.head.flags & ESTIMATE_UPDATED != 0;
+    let updates = estimates.iter().filter(updated).count();
+    assert!(
+        !nis.is_empty() && nis.len() < updates,
+        "{} of {updates}",
+        nis.len()
+    );
+    let mean = nis.iter().map(|sample| sample.nis).sum::<f64>() / nis.len() as f64;
+    assert!(
+        nis.iter().all(|sample| sample.degrees == 3) && (1.0..6.0).contains(&mean),
+        "{mean}"
+    );
 }
 
 #[test]

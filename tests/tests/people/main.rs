@@ -6,3 +6,4 @@ mod exchange;
 mod languages;
 mod monitor;
 mod supervisor;
+mod two_hosts;

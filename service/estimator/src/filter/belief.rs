@@ -7,6 +7,19 @@ use super::side::{Left, Right, Side};
 use crate::lie::LieGroup;
 
 /// `chi = retract(mean, xi)` with `xi ~ N(0, covariance)`, in the error of side S (\[IS\] (4)).
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::{SVector, Vector3};
+///
+/// let here = SE2::exp(&Vector3::new(0.5, 10.0, 0.0));
+/// let variances = SVector::<f64, 3>::new(0.01, 1.0, 1.0);
+/// let belief = Belief::<SE2, Left, 3>::new(here, Covariance::from_variances(&variances));
+/// // The same belief, its error in world axes, and back.
+/// let back = belief.to_right().to_left();
+/// assert!((back.covariance.matrix() - belief.covariance.matrix()).norm() < 1e-9);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Belief<G, S, const D: usize> {
     /// The estimate.

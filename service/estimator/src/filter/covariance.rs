@@ -12,6 +12,16 @@ use crate::lanes::Pair;
 use crate::lie::LieGroup;
 
 /// A symmetric D x D matrix, meant positive semidefinite.
+///
+/// ```
+/// use inekf::filter::Covariance;
+/// use nalgebra::Vector2;
+///
+/// let p = Covariance::from_variances(&Vector2::new(4.0, 1.0));
+/// let entries: Vec<f64> = p.upper_triangle().collect();
+/// assert_eq!(entries, [4.0, 0.0, 1.0]);
+/// assert_eq!(Covariance::<2>::from_upper_triangle(&entries), Some(p));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Covariance<const D: usize>(SMatrix<f64, D, D>);
 

@@ -11,6 +11,14 @@ pub const MAX_DEGREES: usize = 16;
 ///
 /// The degrees are those that the filter finds: hard constraints take theirs from the innovation, and what is
 /// left must be judged by its own number. An innovation of which nothing is left is let in.
+///
+/// ```
+/// use inekf::filter::Gate;
+///
+/// // One good fix of three dimensions in a thousand is refused.
+/// let gate = Gate::of_probability(0.999);
+/// assert!(gate.admits(16.0, 3) && !gate.admits(16.5, 3));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
     /// By degrees of freedom.

@@ -25,6 +25,55 @@
 //! ([`InertialMismatch`](crate::model::InertialMismatch)) or a wrong source
 //! ([`OutputMismatch`](crate::model::OutputMismatch)).
 //! Iterated and with transport, or plain, is a matter of [`UpdateOptions`] for all of them.
+//!
+//! A filter in a few lines: level at rest, half a second of an IMU, a fix.
+//!
+//! ```
+//! use inekf::filter::{
+//!     Alignment, Belief, BiasPrior, Gate, Left, Levelled, UpdateOptions, Verdict, propagate, update,
+//! };
+//! use inekf::model::{Discretisation, ImuInput, ImuNoise, NavState, PositionObservation};
+//! use nalgebra::{Matrix3, Vector3};
+//!
+//! let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+//! let level = Levelled::from_force(&at_rest.force_b, 0.0).expect("there is weight");
+//! let start = Alignment {
+//!     r_wb: level.r_wb,
+//!     tilt_sigma: 0.02,
+//!     heading_sigma: 0.1,
+//!     velocity_w: Vector3::zeros(),
+//!     velocity_sigma: 0.1,
+//!     position_w: Vector3::zeros(),
+//!     position_covariance_w: Matrix3::identity(),
+//!     lever_arm_b: Vector3::zeros(),
+//!     biases: BiasPrior {
+//!         gyro_bias: Vector3::zeros(),
+//!         gyro_sigma: 1e-3,
+//!         accel_bias: Vector3::zeros(),
+//!         accel_sigma: 1e-2,
+//!     },
+//! };
+//! let mut belief: Belief<NavState, Left, 15> = start.belief();
+//!
+//! let noise = ImuNoise { gyro_psd: 1e-7, accel_psd: 4e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+//! let g_w = Vector3::new(0.0, 0.0, -9.80665);
+//! for _ in 0..100 {
+//!     let zoh = Discretisation::ZeroOrderHold;
+//!     belief = propagate(&belief, &at_rest, &g_w, 0.005, zoh, &noise);
+//! }
+//! let fix = PositionObservation {
+//!     position_w: Vector3::new(0.5, 0.0, 0.0),
+//!     covariance_w: Matrix3::identity() * 0.01,
+//!     lever_arm_b: Vector3::zeros(),
+//! };
+//! let options = UpdateOptions { gate: Gate::of_probability(0.999), ..UpdateOptions::ITERATED };
+//! let correction = update(&mut belief, &fix, &options)?;
+//! assert_eq!(correction.verdict, Verdict::Accepted);
+//! // The fix is ten times as good as what was known.
+//! assert!((belief.mean.pose.position.x - 0.5).abs() < 0.01);
+//! assert!(belief.is_plausible());
+//! # Ok::<(), inekf::filter::UpdateError>(())
+//! ```
 
 pub mod adaptive;
 pub mod additive;

@@ -13,6 +13,27 @@
 //!   ask [`LieGroup::is_finite`].
 //!
 //! Every method of the trait is an identity that `tests/lie_identities.rs` runs for every group.
+//!
+//! ```
+//! use inekf::lie::{LieGroup, SE2, SE3, SE23, SO2, SO3};
+//! use nalgebra::SVector;
+//!
+//! /// What holds in every group: `exp` and `log` are inverse, and the adjoint changes sides.
+//! fn identities<G: LieGroup<D>, const D: usize>() {
+//!     let xi = SVector::<f64, D>::from_fn(|i, _| 0.1 * (i as f64 + 1.0));
+//!     let chi = G::exp(&xi);
+//!     assert!((chi.log() - xi).norm() < 1e-12);
+//!     assert!(chi.compose(&chi.inverse()).log().norm() < 1e-12);
+//!     let d = SVector::<f64, D>::repeat(0.02);
+//!     let (right, left) = (chi.compose(&G::exp(&d)), G::exp(&(chi.adjoint() * d)).compose(&chi));
+//!     assert!(right.inverse().compose(&left).log().norm() < 1e-12);
+//! }
+//! identities::<SO2, 1>();
+//! identities::<SE2, 3>();
+//! identities::<SO3, 3>();
+//! identities::<SE3, 6>();
+//! identities::<SE23, 9>();
+//! ```
 
 use core::fmt::{self, Debug};
 

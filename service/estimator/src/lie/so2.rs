@@ -8,6 +8,14 @@ use nalgebra::{Matrix1, Matrix2, Vector1, Vector2};
 use super::{LieGroup, multiply_by_composing};
 
 /// The rotation of the plane that takes body coordinates to world coordinates.
+///
+/// ```
+/// use inekf::lie::SO2;
+/// use nalgebra::Vector2;
+///
+/// let left = SO2::from_angle(90_f64.to_radians());
+/// assert!((left.rotate(&Vector2::x()) - Vector2::y()).norm() < 1e-12);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SO2 {
     cos: f64,

@@ -33,6 +33,13 @@ pub struct SO3 {
 impl SO3 {
     /// Takes a quaternion `x, y, z, w` (Hamilton, body to world) of any norm and normalises it.
     ///
+    /// ```
+    /// use inekf::lie::SO3;
+    ///
+    /// assert!(SO3::from_quaternion_xyzw([0.0, 0.0, 0.0, 1.0]).is_ok());
+    /// assert!(SO3::from_quaternion_xyzw([0.0; 4]).is_err());
+    /// ```
+    ///
     /// # Errors
     /// If an entry is not finite, or the norm is zero, or its square under- or overflows.
     pub fn from_quaternion_xyzw(xyzw: [f64; 4]) -> Result<Self, RotationError> {
@@ -91,6 +98,17 @@ impl SO3 {
     ///
     /// Heading counts counter-clockwise from east; a positive pitch puts the nose down and a positive roll
     /// puts the left side up.
+    ///
+    /// ```
+    /// use inekf::lie::SO3;
+    /// use nalgebra::Vector3;
+    ///
+    /// // Facing north: forward is north, left is west.
+    /// let r_wb = SO3::from_roll_pitch_heading(0.0, 0.0, 90_f64.to_radians());
+    /// assert!((r_wb.rotate(&Vector3::x()) - Vector3::y()).norm() < 1e-12);
+    /// assert!((r_wb.rotate(&Vector3::y()) + Vector3::x()).norm() < 1e-12);
+    /// assert!((r_wb.heading_rad().to_degrees() - 90.0).abs() < 1e-9);
+    /// ```
     #[must_use]
     pub fn from_roll_pitch_heading(roll_rad: f64, pitch_rad: f64, heading_rad: f64) -> Self {
         let turn = |axis: Vector3<f64>, angle_rad: f64| {

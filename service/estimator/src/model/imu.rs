@@ -60,6 +60,20 @@ pub struct ImuNoise {
 }
 
 /// One interval: the group-affine step, and how a disturbance of the input enters it.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Discretisation, ImuInput, ImuStep};
+/// use nalgebra::Vector3;
+///
+/// // Two seconds of 1 m/s^2 forward, from rest: 2 m/s and 2 m.
+/// let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(1.0, 0.0, 9.80665) };
+/// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+/// let step = ImuStep::new(&push, &g_w, 2.0, Discretisation::ZeroOrderHold);
+/// let moved = step.apply(&SE23::identity());
+/// assert!((moved.velocity - Vector3::new(2.0, 0.0, 0.0)).norm() < 1e-12);
+/// assert!((moved.position - Vector3::new(2.0, 0.0, 0.0)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ImuStep {
     /// `chi+ = W phi(chi) U`.

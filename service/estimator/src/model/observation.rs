@@ -25,6 +25,21 @@ pub trait Observation<G: LieGroup<D>, const D: usize, const M: usize> {
 }
 
 /// Position of an antenna, world frame: `y = p_w + r_wb * lever_arm_b + n`.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Observation, PositionObservation};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// // An antenna a metre above the IMU.
+/// let fix = PositionObservation {
+///     position_w: Vector3::new(0.0, 0.0, 1.2),
+///     covariance_w: Matrix3::identity(),
+///     lever_arm_b: Vector3::new(0.0, 0.0, 1.0),
+/// };
+/// let residual = fix.residual(&SE23::identity());
+/// assert!((residual.norm() - 0.2).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionObservation {
     /// Measured position, m, world frame.

@@ -10,6 +10,17 @@ use super::pose::RigidPose;
 use crate::lie::LieGroup;
 
 /// One step of odometry on the group G.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use nalgebra::Vector3;
+///
+/// // Two rows of a quarter turn to the left after a metre forward.
+/// let row = OdometryStep::<SE2>::new(&Vector3::new(90_f64.to_radians(), 1.0, 0.0), 0.1);
+/// let moved = row.apply(&row.apply(&SE2::identity()));
+/// assert!((moved.position - nalgebra::Vector2::new(1.0, 1.0)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OdometryStep<G> {
     /// `kappa = (Omega, u)`.

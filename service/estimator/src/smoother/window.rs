@@ -119,6 +119,33 @@ impl fmt::Display for WindowError {
 impl core::error::Error for WindowError {}
 
 /// The newest states of a trajectory, smoothed.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+/// use inekf::smoother::{Preintegration, Window, WindowOptions};
+/// use nalgebra::{Matrix3, SVector, Vector3};
+///
+/// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+/// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+/// let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+/// let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+/// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+/// for _ in 0..5 {
+///     let mut motion = Preintegration::new(&window.newest().mean);
+///     motion.push(&at_rest, &g_w, 0.2, Discretisation::ZeroOrderHold, &noise);
+///     window.push(&motion);
+///     window.update(PositionObservation {
+///         position_w: Vector3::new(0.3, 0.0, 0.0),
+///         covariance_w: Matrix3::identity() * 0.01,
+///         lever_arm_b: Vector3::zeros(),
+///     })?;
+/// }
+/// assert_eq!(window.len(), 3);
+/// assert!((window.newest().mean.position.x - 0.3).abs() < 0.05);
+/// # Ok::<(), inekf::smoother::WindowError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Window<G, S, const D: usize> {
     options: WindowOptions,

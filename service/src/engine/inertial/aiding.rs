@@ -20,6 +20,8 @@ pub enum Aiding {
     Velocity(VelocityObservation),
     /// Heading.
     Heading(HeadingObservation),
+    /// The engine's own guess that the vehicle stands.
+    Standstill(VelocityObservation),
 }
 
 impl Measurement for Aiding {
@@ -28,12 +30,13 @@ impl Measurement for Aiding {
             Self::Position(_) => FixKind::Position,
             Self::Velocity(_) => FixKind::Velocity,
             Self::Heading(_) => FixKind::Heading,
+            Self::Standstill(_) => FixKind::Standstill,
         }
     }
 
     fn dimension(&self) -> usize {
         match self {
-            Self::Position(_) | Self::Velocity(_) => 3,
+            Self::Position(_) | Self::Velocity(_) | Self::Standstill(_) => 3,
             Self::Heading(_) => 1,
         }
     }
@@ -45,7 +48,7 @@ impl Measurement for Aiding {
                 covariance_w: observation.covariance_w,
                 lever_arm_b: observation.lever_arm_b,
             }),
-            Self::Velocity(_) | Self::Heading(_) => None,
+            Self::Velocity(_) | Self::Heading(_) | Self::Standstill(_) => None,
         }
     }
 
@@ -59,7 +62,7 @@ impl Aiding {
     pub fn for_window(&self) -> smoother::Fix {
         match self {
             Self::Position(observation) => (*observation).into(),
-            Self::Velocity(observation) => (*observation).into(),
+            Self::Velocity(observation) | Self::Standstill(observation) => (*observation).into(),
             Self::Heading(observation) => (*observation).into(),
         }
     }
@@ -75,7 +78,9 @@ impl Aiding {
     ) -> Result<Fused, UpdateError> {
         let correction = match self {
             Self::Position(observation) => update(belief, observation, options),
-            Self::Velocity(observation) => update(belief, observation, options),
+            Self::Velocity(observation) | Self::Standstill(observation) => {
+                update(belief, observation, options)
+            }
             Self::Heading(observation) => update(belief, observation, options),
         }?;
         Ok(Fused {
@@ -92,7 +97,7 @@ impl Aiding {
                 observation.residual(mean).norm_squared(),
                 observation.covariance_w.trace(),
             ),
-            Self::Velocity(observation) => (
+            Self::Velocity(observation) | Self::Standstill(observation) => (
                 observation.residual(mean).norm_squared(),
                 observation.covariance_w.trace(),
             ),
@@ -117,7 +122,7 @@ impl Aiding {
             }
         };
         match self {
-            Self::Velocity(_) => doubt(3),
+            Self::Velocity(_) | Self::Standstill(_) => doubt(3),
             Self::Position(_) => doubt(6),
             Self::Heading(_) => {
                 // A turn about the vertical, in body coordinates.

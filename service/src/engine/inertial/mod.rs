@@ -4,13 +4,13 @@ use inekf::filter::{
     Alignment, Belief, InertialSide, Levelled, UpdateError, Verdict, propagate_in_place,
 };
 use inekf::lie::{LieGroup, SO3};
-use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState};
+use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState, VelocityObservation};
 use inekf::smoother::Preintegration;
 use inekf_shared::message::{
     EstimateSe23, HeadingFix, INPUT_IMU, ImuSample, MODEL_IMU, PositionFix, ProcessNoise,
-    StateVector, VelocityFix, Zero,
+    StateVector, VelocityFix, ZERO_VELOCITY_SOURCE, Zero,
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::driver::Engine;
 use super::fix::Fix;
@@ -28,8 +28,10 @@ use crate::config::{Hold, InertialNoise};
 pub mod aiding;
 mod intake;
 mod request;
+pub mod standstill;
 
 use aiding::Aiding;
+use standstill::{Standstill, StandstillSettings};
 
 /// An inertial filter of side S on the state G (9 or 15 dimensions).
 #[derive(Debug)]
@@ -39,6 +41,7 @@ pub struct Inertial<G, S, const D: usize> {
     fusion: FusionSettings,
     processor: Processor,
     levelling: Levelling,
+    standstill: Option<Standstill>,
     filter: core::marker::PhantomData<(G, S)>,
 }
 
@@ -72,6 +75,7 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Inertial<G, S, D> {
             fusion: settings.fusion,
             processor: Processor::detect(),
             levelling: Levelling::new(window_ns),
+            standstill: settings.imu.standstill.map(Standstill::new),
             filter: core::marker::PhantomData,
         }
     }
@@ -146,6 +150,24 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
 
     fn heading(&self, message: &HeadingFix) -> Result<Fix<Aiding>, Refusal> {
         intake::heading(message, &self.fusion.sources)
+    }
+
+    fn propose(&mut self, stamp_ns: u64, input: &ImuInput) -> Option<Fix<Aiding>> {
+        let stands = self.standstill.as_mut()?.push(stamp_ns, input);
+        let StandstillSettings {
+            sigma, block_ns, ..
+        } = self.imu.standstill?;
+        stands.then(|| Fix {
+            stamp_ns,
+            source: ZERO_VELOCITY_SOURCE,
+            partner: None,
+            // Counts them, so that the covariance is mended as often as with any other fix.
+            seq: stamp_ns / block_ns.max(1),
+            measurement: Aiding::Standstill(VelocityObservation {
+                velocity_w: Vector3::zeros(),
+                covariance_w: Matrix3::identity() * (sigma * sigma),
+            }),
+        })
     }
 
     fn attitude(&mut self, stamp_ns: u64, input: &ImuInput) -> Option<SO3> {
@@ -248,6 +270,14 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
         fix: &Fix<Aiding>,
         gated: bool,
     ) -> Result<Fused, UpdateError> {
+        if let (Aiding::Standstill(_), Some(settings)) = (&fix.measurement, &self.imu.standstill)
+            && !Standstill::is_believable(settings, belief)
+        {
+            return Ok(Fused {
+                verdict: Verdict::Gated,
+                nis: f64::NAN,
+            });
+        }
         let options = self.fusion.options(gated);
         let fused = fix.measurement.fuse(belief, &options)?;
         if fused.verdict == Verdict::Accepted && fix.is_mended() {

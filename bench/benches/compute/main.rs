@@ -12,6 +12,7 @@ mod clock;
 mod dense;
 mod groups;
 mod instructions;
+mod late;
 mod predict;
 mod setup;
 mod smoother;
@@ -26,6 +27,7 @@ fn routines(suite: &mut impl Suite) {
     predict::routines(suite);
     update::routines(suite);
     groups::routines(suite);
+    late::routines(suite);
     smoother::routines(suite);
 }
 

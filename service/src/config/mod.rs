@@ -51,8 +51,9 @@ mod update;
 mod walk;
 
 pub use choice::{
-    Axis, Discretisation, Estimator, GapPolicy, HinfGain, Hold, Invariance, Jacobians, Level,
-    Mismatch, MismatchKind, MissingPartner, Model, Parametrisation, Prior, Transport, WaitMode,
+    Axis, Discretisation, Estimator, GapPolicy, HinfGain, Hold, Invariance, Jacobians, LateMethod,
+    Level, Mismatch, MismatchKind, MissingPartner, Model, Parametrisation, Prior, Transport,
+    WaitMode,
 };
 pub use fault::{ConfigFaults, Fault};
 pub use fleet::{Fleet, MAX_VEHICLES, expand};

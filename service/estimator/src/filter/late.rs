@@ -34,7 +34,7 @@ use crate::model::{Automorphism, Drift};
 
 /// The least share of a variance that may remain for a subtraction to be as good as a replay: with less, more than two
 /// digits go with what is taken away.
-const LEAST_SHARE: f64 = 0.01;
+pub const LEAST_SHARE: f64 = 0.01;
 
 /// What a measurement changed at its own time, to be carried on to later beliefs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,25 +62,48 @@ impl<G: LieGroup<D>, S: LateSide, const D: usize> LateCorrection<G, S, D> {
     /// The belief `now`, which `drift` and what the body felt have led to from the belief before the measurement, as
     /// if they had led to it from the one after. Biases and measurements in between have no place in this.
     ///
-    /// `None` where a variance now shrinks more than a hundredfold, so that the subtraction would lose digits: replay.
+    /// `None` where less than [`LEAST_SHARE`] of a variance remains, so that the subtraction would lose digits: replay.
     pub fn carried<A: Automorphism<G, D>>(
         &self,
         drift: &Drift<G, A, D>,
         now: &Belief<G, S, D>,
     ) -> Option<Belief<G, S, D>> {
+        let (belief, share) = self.carried_with_share(drift, now);
+        (share >= LEAST_SHARE).then_some(belief)
+    }
+
+    /// [`carried`](Self::carried) in any case, with the least share of a variance that remains.
+    pub fn carried_with_share<A: Automorphism<G, D>>(
+        &self,
+        drift: &Drift<G, A, D>,
+        now: &Belief<G, S, D>,
+    ) -> (Belief<G, S, D>, f64) {
         let body = drift.body_between(&self.before, &now.mean);
         let mean = drift.apply(&self.after).compose(&body);
-        let remaining = S::remaining(&self.lost, drift, &body, now)?;
-        Some(S::recentred(&remaining, now, mean))
+        let (remaining, share) = S::remaining(&self.lost, drift, &body, now);
+        (S::recentred(&remaining, now, mean), share)
     }
 }
 
-/// `P - lost`, if enough of every variance remains.
-fn less<const D: usize>(p: &Covariance<D>, lost: &SMatrix<f64, D, D>) -> Option<Covariance<D>> {
-    let remaining = p.matrix() - lost;
-    (0..D)
-        .all(|i| remaining[(i, i)] >= LEAST_SHARE * p.matrix()[(i, i)])
-        .then(|| Covariance::from_upper(remaining))
+/// `P - lost`, and the least share of a variance that remains; 0 if that is not a number.
+fn less<const D: usize>(p: &Covariance<D>, lost: &SMatrix<f64, D, D>) -> (Covariance<D>, f64) {
+    let mut remaining = *p;
+    let mut share = f64::INFINITY;
+    remaining.change_symmetrically(|remaining| {
+        *remaining -= lost;
+        for i in 0..D {
+            let (left, whole) = (remaining[(i, i)], p.matrix()[(i, i)]);
+            // What was known exactly stays so.
+            if left != whole {
+                share = if left >= 0.0 {
+                    share.min(left / whole)
+                } else {
+                    0.0
+                };
+            }
+        }
+    });
+    (remaining, share)
 }
 
 /// A side on which a correction is carried on in time.
@@ -92,13 +115,13 @@ pub trait LateSide: Side {
     ) -> SMatrix<f64, D, D>;
 
     /// What is left of the covariance of `now` of such a loss, in coordinates around its mean, after `drift` and the
-    /// motion `body`; `None` if it is too little.
+    /// motion `body`, and the least share of a variance that this is.
     fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
         lost: &SMatrix<f64, D, D>,
         drift: &Drift<G, A, D>,
         body: &G,
         now: &Belief<G, Self, D>,
-    ) -> Option<Covariance<D>>;
+    ) -> (Covariance<D>, f64);
 
     /// The belief at `mean` whose covariance is `remaining` in coordinates around the mean of `now`.
     fn recentred<G: LieGroup<D>, const D: usize>(
@@ -135,7 +158,7 @@ impl LateSide for Left {
         drift: &Drift<G, A, D>,
         body: &G,
         now: &Belief<G, Self, D>,
-    ) -> Option<Covariance<D>> {
+    ) -> (Covariance<D>, f64) {
         less(&now.covariance, &left_loss(lost, drift, body))
     }
 
@@ -164,7 +187,7 @@ impl LateSide for Right {
         drift: &Drift<G, A, D>,
         _body: &G,
         now: &Belief<G, Self, D>,
-    ) -> Option<Covariance<D>> {
+    ) -> (Covariance<D>, f64) {
         let mut lost = *lost;
         drift.automorphism.congruence(&mut lost);
         G::congruence(&mut lost, &drift.world.adjoint());
@@ -195,7 +218,7 @@ impl LateSide for Additive {
         drift: &Drift<G, A, D>,
         body: &G,
         now: &Belief<G, Self, D>,
-    ) -> Option<Covariance<D>> {
+    ) -> (Covariance<D>, f64) {
         less(&now.left_covariance(), &left_loss(lost, drift, body))
     }
 

@@ -59,7 +59,7 @@ pub use factor::Factor;
 pub use gain::{Consider, GainRule, Judgement, Kalman};
 pub use gate::Gate;
 pub use hinf::{HInfinity, HInfinityGain};
-pub use late::{LateCorrection, LateSide};
+pub use late::{LEAST_SHARE, LateCorrection, LateSide};
 pub use linearised::Linearised;
 pub use propagate::{
     propagate, propagate_augmented, propagate_dense, propagate_in_place, propagate_odometry,

@@ -23,13 +23,13 @@ fn settings_of(method: LateMethod) -> Settings {
     settings
 }
 
-/// What an engine without biases makes of the inputs, from a state that is known to half a metre.
+/// What an engine without biases makes of the inputs, from a state that is known to 0.2 m, 0.2 m/s and 0.2 rad.
 fn engine_of<G: InertialState<D>, S: InertialSide, const D: usize>(
     settings: Settings,
     inputs: &[Input],
 ) -> (InertialEngine<G, S, D>, Vec<EstimateSe23>) {
     let mut engine = InertialEngine::<G, S, D>::new(settings);
-    engine.set_state(&state_on_circle(stamp(0), 0.5)).unwrap();
+    engine.set_state(&state_on_circle(stamp(0), 0.2)).unwrap();
     let mut rows = Vec::new();
     for input in inputs {
         feed(&mut engine, input, &mut rows);

@@ -6,8 +6,9 @@
 //! back to one of them first gives it what it has missed, in the same way. Fixes are carried in the order of their
 //! stamps alone: each is the last one before the newest state, or it is replayed.
 //!
-//! What is carried is the replayed estimate but for rounding, about 1e-14 of a standard deviation. A fix that is late by
-//! a few samples only is cheaper to replay, and then is bit for bit what it would have been on time.
+//! What is carried is the replayed estimate but for rounding, below 1e-12 of the scale of each number. A fix that is late
+//! by a few samples only is cheaper to replay, and then is bit for bit what it would have been on time; so is one with
+//! which too little would remain of a variance, by it and by those carried before it.
 
 use inekf::filter::{LEAST_SHARE, UpdateError};
 
@@ -18,7 +19,7 @@ use crate::engine::settings::FusionSettings;
 
 /// Carried fixes that are remembered at one time; what comes beyond is replayed.
 const MAX_CARRIED: usize = 32;
-/// Replaying this many samples costs as much as carrying one fix.
+/// Replaying this many samples costs no more than carrying one fix.
 const BREAK_EVEN: usize = 8;
 
 /// A fix that was fused at its own stamp and carried to the newest state.
@@ -30,6 +31,8 @@ pub(super) struct Carried<X> {
     until_ns: u64,
     /// The state of that knot without it, and with it.
     states: (X, X),
+    /// The least share that it left of a variance of the newest state.
+    share: f64,
 }
 
 impl<X> Carried<X> {
@@ -71,8 +74,10 @@ impl<M: Model> Timeline<M> {
             return Attempt::Refused;
         };
         let knot = self.knots[back_to];
-        let missed = self.carried.iter().filter(|fix| fix.is_missed_by(&knot));
-        let is_cheaper = self.knots.len() - 1 - back_to > BREAK_EVEN + missed.count();
+        let missed = || self.carried.iter().filter(|fix| fix.is_missed_by(&knot));
+        let is_cheaper = self.knots.len() - 1 - back_to > BREAK_EVEN + missed().count();
+        // What those before it have taken away, whose rounding no fix has taken back yet.
+        let remaining: f64 = missed().map(|fix| fix.share.min(1.0)).product();
         let is_last = self
             .entries
             .get(index + 1)
@@ -98,17 +103,19 @@ impl<M: Model> Timeline<M> {
                 }
             }
         });
-        if let Some(newest) = self.knots.back_mut() {
-            let (state, share) = model.carry(&before, &after, newest_ns - from_ns, &newest.state);
-            if share < LEAST_SHARE {
-                return Attempt::Judged(outcome);
-            }
-            newest.state = state;
+        let Some(newest) = self.knots.back_mut() else {
+            return Attempt::Judged(outcome);
+        };
+        let (state, share) = model.carry(&before, &after, newest_ns - from_ns, &newest.state);
+        if share.min(1.0) * remaining < LEAST_SHARE {
+            return Attempt::Judged(outcome);
         }
+        newest.state = state;
         self.carried.push_back(Carried {
             from_ns,
             until_ns: newest_ns,
             states: (before, after),
+            share,
         });
         Attempt::Carried(outcome)
     }

@@ -9,6 +9,7 @@ use clap::{Parser, Subcommand};
 use inekf_bench::experiment::section7::{MismatchLaw, Setup};
 use inekf_bench::experiment::{self, Experiment, Prior};
 use inekf_bench::fleet::{self, FleetOptions};
+use inekf_bench::late;
 use inekf_bench::latency::mechanism::{self, Mechanism, Wait};
 use inekf_bench::latency::neighbour::{self, Neighbour};
 use inekf_bench::latency::{LatencyOptions, figure, measure};
@@ -47,6 +48,16 @@ enum Command {
     Wake {
         #[command(flatten)]
         options: WakeOptions,
+    },
+    /// A fix that comes late on SE_2(3): carried to now in constant time, against replaying the samples since. A table
+    /// on standard output, late.csv and late.svg in a folder.
+    Late {
+        /// Folder for the results; made if need be.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// How often each way is timed; medians are reported.
+        #[arg(long, default_value_t = 201)]
+        turns: usize,
     },
     /// An experiment of the papers: tables on standard output, CSV files and SVG figures in a folder.
     Experiment {
@@ -169,6 +180,13 @@ fn run(command: Command) -> anyhow::Result<()> {
             let tables = experiment::run(name, &options, &out)?;
             let mut stdout = std::io::stdout().lock();
             stdout.write_all(tables.as_bytes())?;
+            writeln!(stdout, "\nwritten to {}", out.display())?;
+            Ok(())
+        }
+        Command::Late { out, turns } => {
+            let table = late::run(turns, &out)?;
+            let mut stdout = std::io::stdout().lock();
+            stdout.write_all(table.as_bytes())?;
             writeln!(stdout, "\nwritten to {}", out.display())?;
             Ok(())
         }

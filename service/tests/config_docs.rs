@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use inekf_service::config::{
     Axis, Checkpoint, Config, Discretisation, Estimator, Fleet, GapPolicy, HeadingSource, Health,
     Hinf, HinfGain, Hold, Imu, IncrementNoise, Inertial, InertialNoise, Initial, Invariance,
-    Journal, KeySpec, Late, Level, Mismatch, Mismatched, MissingPartner, Model, Motion, Odometry,
-    OdometryNoise, PositionSource, Rows, Runtime, Smoother, Stacking, Transport, Update,
+    Journal, KeySpec, Late, LateMethod, Level, Mismatch, Mismatched, MissingPartner, Model, Motion,
+    Odometry, OdometryNoise, PositionSource, Rows, Runtime, Smoother, Stacking, Transport, Update,
     VelocitySource, WaitMode, WhiteNoise, Wrong, schema,
 };
 
@@ -370,6 +370,7 @@ fn a_minimal_file_takes_the_documented_defaults() {
         hinf: None,
         smoother: None,
         late: Late {
+            method: LateMethod::Carry,
             window_s: 1.0,
             capacity: 2048,
         },

@@ -9,12 +9,14 @@ use common::{
     settings, stamp, state_on_circle, velocity,
 };
 use counting::allocations;
+use inekf::filter::Left;
+use inekf::lie::SE23;
 use inekf_service::checkpoint::handover;
-use inekf_service::config::Checkpoint;
-use inekf_service::engine::Outbox;
+use inekf_service::config::{Checkpoint, LateMethod};
 use inekf_service::engine::resume::{ResumeSettings, Resumption};
 use inekf_service::engine::settings::{LevelSource, PositionSource};
 use inekf_service::engine::tally::Refusal;
+use inekf_service::engine::{InertialEngine, Outbox};
 use inekf_shared::message::{
     EstimateSe23, Header, INPUT_ODOMETRY_2D, ProcessNoise, REASON_BAD_COVARIANCE,
     REASON_BUFFER_FULL, REASON_NOT_FINITE, REASON_NOT_READY, REASON_OUT_OF_RANGE,
@@ -83,6 +85,35 @@ fn one_of_everything(engine: &mut Engine, k: u64, outbox: &mut Latest) {
 fn the_counter_counts() {
     assert!(allocations(|| drop(std::hint::black_box(vec![1u8; 100]))) >= 2);
     assert_eq!(allocations(|| {}), 0);
+}
+
+#[test]
+fn nothing_is_allocated_where_late_fixes_are_carried() {
+    let mut settings = settings();
+    settings.initial.wait_for_request = true;
+    assert_eq!(settings.fusion.late_method, LateMethod::Carry);
+    let mut engine = InertialEngine::<SE23, Left, 9>::new(settings);
+    let outbox = &mut Latest(EstimateSe23::ZERO);
+    engine
+        .set_state(&state_on_circle(stamp(1000), 0.7))
+        .unwrap();
+    let allocated = allocations(|| {
+        for k in 1000..4000 {
+            feed(&mut engine, &Input::Imu(imu(k)), outbox);
+            // One with every sample, more than are remembered; now and then one that goes back to the middle of them.
+            if k >= 1100 {
+                let fix = Input::Position(position(stamp(k) - 99 * PERIOD_NS, k, 0));
+                feed(&mut engine, &fix, outbox);
+            }
+            if k.is_multiple_of(97) {
+                let fix = Input::Velocity(velocity(stamp(k) - 30 * PERIOD_NS, k));
+                feed(&mut engine, &fix, outbox);
+            }
+        }
+    });
+    assert_eq!(allocated, 0);
+    assert_refused(engine.tally(), &[]);
+    assert!(engine.tally().counters.accepted > 2900);
 }
 
 #[test]

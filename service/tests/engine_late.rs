@@ -1,5 +1,8 @@
-//! Late fixes: whatever the order of arrival, the estimate is bit for bit the one on time.
+//! Late fixes: whatever the order of arrival, the estimate is bit for bit the one on time; without biases, where they
+//! are [`carried`], but for rounding.
 
+#[path = "engine_late/carried.rs"]
+mod carried;
 mod common;
 
 use common::{

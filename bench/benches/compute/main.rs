@@ -14,6 +14,7 @@ mod dense;
 mod engine;
 mod groups;
 mod instructions;
+mod late;
 mod predict;
 mod setup;
 mod smoother;
@@ -28,6 +29,7 @@ fn routines(suite: &mut impl Suite) {
     predict::routines(suite);
     update::routines(suite);
     groups::routines(suite);
+    late::routines(suite);
     smoother::routines(suite);
     engine::routines(suite);
 }

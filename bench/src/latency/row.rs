@@ -145,7 +145,7 @@ impl Distribution {
         self.figure(quantile) as f64 / base.figure(quantile).max(1) as f64
     }
 
-    /// Rounds that took [`HALT_NS`] longer than the median, for each second of rounds: what stops the machine now and
+    /// Rounds that took 10 µs longer than the median, for each second of rounds: what stops the machine now and
     /// then, timer ticks above all, stops all mechanisms about as often in a second, and the longer round more often.
     pub fn halts_per_s(&self) -> f64 {
         let limit = self.figure(MEDIAN) + HALT_NS;

@@ -243,6 +243,17 @@ choice! {
 }
 
 choice! {
+    /// How a fix that comes after later samples is fused.
+    pub enum LateMethod {
+        /// What it corrects is carried to the newest state in constant time where that is exact and cheaper; elsewhere
+        /// the samples since are replayed.
+        Carry = "carry",
+        /// The samples since are replayed: the estimate is bit for bit what it would have been on time.
+        Replay = "replay",
+    }
+}
+
+choice! {
     /// How the daemon waits for samples.
     pub enum WaitMode {
         /// Asleep until a sender wakes it.

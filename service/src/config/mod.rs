@@ -52,8 +52,9 @@ mod walk;
 mod zero_velocity;
 
 pub use choice::{
-    Axis, Discretisation, Estimator, GapPolicy, HinfGain, Hold, Invariance, Jacobians, Level,
-    Mismatch, MismatchKind, MissingPartner, Model, Parametrisation, Prior, Transport, WaitMode,
+    Axis, Discretisation, Estimator, GapPolicy, HinfGain, Hold, Invariance, Jacobians, LateMethod,
+    Level, Mismatch, MismatchKind, MissingPartner, Model, Parametrisation, Prior, Transport,
+    WaitMode,
 };
 pub use fault::{ConfigFaults, Fault};
 pub use fleet::{Fleet, MAX_VEHICLES, expand};

@@ -2,17 +2,19 @@
 
 use std::time::Duration;
 
-use super::choice::WaitMode;
+use super::choice::{LateMethod, WaitMode};
 use super::interval::Interval;
 use super::section::Section;
 
 /// Measurements that arrive after later samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Late {
-    /// A fix this late is still fused, by replay; one that is later is counted and dropped, s.
+    /// A fix this late is still fused; one that is later is counted and dropped, s.
     pub window_s: f64,
     /// How many samples the replay's ring buffer holds.
     pub capacity: usize,
+    /// How.
+    pub method: LateMethod,
 }
 
 /// When the estimate is called degraded or stale, and how often that is published.
@@ -46,6 +48,7 @@ impl Late {
         Self {
             window_s: late.float("window_s", "s", Interval::closed(0.0, 60.0), 1.0),
             capacity: late.integer("capacity", Some("samples"), 1..=65_536, 2048),
+            method: late.choice("method", LateMethod::Carry),
         }
     }
 

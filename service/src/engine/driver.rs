@@ -55,7 +55,8 @@ pub struct Engine<M: Model, H = Timeline<M>> {
 impl<M: Model> Engine<M> {
     /// A filter that waits for its first samples, with all the memory it will ever use.
     pub fn of(model: M, fusion: FusionSettings) -> Self {
-        Self::with_history(model, fusion, Timeline::new(fusion))
+        let timeline = Timeline::new(&model, fusion);
+        Self::with_history(model, fusion, timeline)
     }
 }
 

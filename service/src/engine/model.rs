@@ -173,6 +173,24 @@ pub trait Model: Debug + Sized {
         widening: &Widening,
     ) -> Result<Fused, UpdateError>;
 
+    /// Whether what a fix changes can be [carried](Self::carry) to later states without replaying the samples between.
+    fn carries(&self) -> bool {
+        false
+    }
+
+    /// `now`, to which `elapsed_ns` of samples and no fix have led from `before`, as if they had led to it from `after`;
+    /// and the least share of a variance of `now` that remains. Only of models that [carry](Self::carries).
+    fn carry(
+        &self,
+        before: &Self::State,
+        after: &Self::State,
+        elapsed_ns: u64,
+        now: &Self::State,
+    ) -> (Self::State, f64) {
+        let _ = (before, after, elapsed_ns);
+        (*now, 0.0)
+    }
+
     /// Where the body is, m, world frame; z is 0 in the plane.
     fn place_w(&self, state: &Self::State) -> Vector3<f64>;
 

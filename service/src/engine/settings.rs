@@ -12,8 +12,8 @@ use super::inertial::standstill::StandstillSettings;
 use super::resume::Doubt;
 use super::stack::{Missing, StackSettings};
 use crate::config::{
-    self, Config, GapPolicy, Hold, Inertial, Level, MissingPartner, Motion, Parametrisation,
-    WhiteNoise,
+    self, Config, GapPolicy, Hold, Inertial, LateMethod, Level, MissingPartner, Motion,
+    Parametrisation, WhiteNoise,
 };
 
 /// The IMU: what it may say, how its samples are held, its noise.
@@ -195,6 +195,8 @@ pub struct FusionSettings {
     pub late_window_ns: u64,
     /// Samples kept for fusing late fixes.
     pub late_capacity: usize,
+    /// How late fixes are fused.
+    pub late_method: LateMethod,
     /// No accepted fix for this long is degraded.
     pub degraded_after_ns: u64,
     /// Two position sources that are taken together.
@@ -409,6 +411,7 @@ fn fusion(config: &Config) -> FusionSettings {
         sources,
         late_window_ns: config.late.window_ns(),
         late_capacity: config.late.capacity,
+        late_method: config.late.method,
         degraded_after_ns: config.health.degraded_after_ns(),
         stack: config.stacking.as_ref().map(|stacking| StackSettings {
             sources: stacking.sources,

@@ -3,7 +3,8 @@
 //! A ring of knots (one per sample: the sample and the state after every fix due at its stamp)
 //! reaches back over a bounded window. A fix between two samples splits the interval. A fix that
 //! comes late goes back to the last knot before it and the samples since are replayed: the result
-//! is bit for bit what it would have been on time. Nothing here allocates after construction.
+//! is bit for bit what it would have been on time. Where [`carrying`] what it changes to the newest
+//! state is exact and cheaper, that is done instead. Nothing here allocates after construction.
 
 use std::collections::VecDeque;
 
@@ -14,6 +15,10 @@ use super::history::{Breakdown, Event, History, Insertion, MAX_FIXES};
 use super::model::{Fused, Model};
 use super::recovery::{Lockout, Widening};
 use super::settings::FusionSettings;
+
+mod carrying;
+
+use carrying::{Attempt, Carried};
 
 /// A sample, and the state at its stamp after the fixes due by then.
 #[derive(Clone, Copy, Debug)]
@@ -51,13 +56,16 @@ pub struct Timeline<M: Model> {
     /// Sorted by [`Fix::order`].
     entries: Vec<Entry<M::Measurement>>,
     lockout: Lockout,
+    /// Fixes that the newest state knows of and some knots before it do not, oldest first.
+    carried: VecDeque<Carried<M::State>>,
 }
 
 impl<M: Model> Timeline<M> {
     /// An empty timeline with all the memory it will ever use.
-    pub fn new(fusion: FusionSettings) -> Self {
+    pub fn new(model: &M, fusion: FusionSettings) -> Self {
         Self {
             fusion,
+            carried: VecDeque::with_capacity(carrying::capacity(model, &fusion)),
             knots: VecDeque::with_capacity(fusion.late_capacity.max(2)),
             entries: Vec::with_capacity(MAX_FIXES),
             lockout: Lockout::new(fusion.recover_after),
@@ -137,6 +145,25 @@ impl<M: Model> Timeline<M> {
         outcome
     }
 
+    /// Emits what became of a fix that came `lateness_ns` behind the newest state.
+    fn report(
+        &self,
+        fix: &Fix<M::Measurement>,
+        outcome: Result<Fused, UpdateError>,
+        lateness_ns: u64,
+        mut emit: impl FnMut(Event<'_, M::State, M::Measurement>),
+    ) {
+        if let Some(newest) = self.knots.back() {
+            emit(Event::Judged {
+                stamp_ns: newest.stamp_ns,
+                state: &newest.state,
+                fix,
+                outcome,
+                replayed: lateness_ns > 0,
+            });
+        }
+    }
+
     /// Appends a knot, forgetting what has left the window.
     fn push(&mut self, knot: Knot<M::Input, M::State>) {
         let stamp_ns = knot.stamp_ns;
@@ -186,6 +213,7 @@ impl<M: Model> History<M> for Timeline<M> {
     fn clear(&mut self, _model: &M) {
         self.knots.clear();
         self.entries.clear();
+        self.carried.clear();
         self.lockout.clear();
     }
 
@@ -268,7 +296,7 @@ impl<M: Model> History<M> for Timeline<M> {
         &mut self,
         model: &M,
         fix: Fix<M::Measurement>,
-        mut emit: impl FnMut(Event<'_, M::State, M::Measurement>),
+        emit: impl FnMut(Event<'_, M::State, M::Measurement>),
     ) -> Insertion {
         let Some((newest_ns, _)) = self.newest() else {
             return Insertion::TooLate;
@@ -303,7 +331,16 @@ impl<M: Model> History<M> for Timeline<M> {
             return Insertion::Waiting;
         };
 
-        let mut outcome = Err(UpdateError::NotFinite);
+        let attempt = self.attempt_to_carry(model, index, back_to);
+        if let Attempt::Carried(outcome) = attempt {
+            self.report(&fix, outcome, lateness_ns, emit);
+            return Insertion::Judged;
+        }
+        self.catch_up(model, back_to);
+        let (fresh, mut outcome) = match attempt {
+            Attempt::Judged(outcome) => (None, outcome),
+            _ => (Some(index), Err(UpdateError::NotFinite)),
+        };
         if self.knots[back_to].stamp_ns == fix.stamp_ns {
             let mut state = self.knots[back_to].state;
             outcome = self.judge(model, index, &mut state, true);
@@ -321,7 +358,7 @@ impl<M: Model> History<M> for Timeline<M> {
             let mut state = from.state;
             self.run_interval(model, &interval, &mut state, &mut |timeline, at, event| {
                 if let Passed::Fix(state) = event {
-                    let judged = timeline.judge(model, at, state, at == index);
+                    let judged = timeline.judge(model, at, state, Some(at) == fresh);
                     if at == index {
                         outcome = judged;
                     }
@@ -329,15 +366,7 @@ impl<M: Model> History<M> for Timeline<M> {
             });
             self.knots[later].state = state;
         }
-        if let Some(newest) = self.knots.back() {
-            emit(Event::Judged {
-                stamp_ns: newest.stamp_ns,
-                state: &newest.state,
-                fix: &fix,
-                outcome,
-                replayed: lateness_ns > 0,
-            });
-        }
+        self.report(&fix, outcome, lateness_ns, emit);
         Insertion::Judged
     }
 }

@@ -10,8 +10,8 @@ mod motion;
 pub use direct::*;
 pub use motion::*;
 
-use inekf::filter::Left;
-use inekf::model::NavState;
+use inekf::filter::{InertialSide, Left};
+use inekf::model::{InertialState, NavState};
 use inekf_service::config::Config;
 use inekf_service::engine::tally::Tally;
 use inekf_service::engine::{InertialEngine, Outbox, Settings};
@@ -81,7 +81,11 @@ impl Input {
 }
 
 /// Gives `input` to `engine`.
-pub fn feed(engine: &mut Engine, input: &Input, outbox: &mut impl Outbox<EstimateSe23>) {
+pub fn feed<G: InertialState<D>, S: InertialSide, const D: usize>(
+    engine: &mut InertialEngine<G, S, D>,
+    input: &Input,
+    outbox: &mut impl Outbox<EstimateSe23>,
+) {
     match input {
         Input::Imu(message) => engine.sample(message, message.header.sent_ns + 1, outbox),
         Input::Position(message) => engine.position(message, outbox),

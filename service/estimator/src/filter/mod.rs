@@ -6,6 +6,7 @@
 //! core for every sensor, group, side and filter. What tells the filters apart is the side and the rule of the
 //! gain ([`gain`]): Kalman's, the linearly constrained one ([`constrained`], on the algebra of [`constraint`]),
 //! H-infinity ([`hinf`]), Schmidt's.
+//! [`late`] gives today's belief a correction of the past without going back.
 //! [`adaptive`] runs several filters at once where the behaviour of a mismatch is itself unknown,
 //! [`gate`] judges innovations, [`alignment`] makes the first belief.
 //!
@@ -88,6 +89,7 @@ pub mod factor;
 pub mod gain;
 pub mod gate;
 pub mod hinf;
+pub mod late;
 pub mod linearised;
 pub mod propagate;
 mod seen;
@@ -106,6 +108,7 @@ pub use factor::Factor;
 pub use gain::{Consider, GainRule, Judgement, Kalman};
 pub use gate::Gate;
 pub use hinf::{HInfinity, HInfinityGain};
+pub use late::{LEAST_SHARE, LateCorrection, LateSide};
 pub use linearised::Linearised;
 pub use propagate::{
     propagate, propagate_augmented, propagate_dense, propagate_in_place, propagate_odometry,

@@ -15,6 +15,7 @@ use core::fmt::Debug;
 
 use nalgebra::{SMatrix, SVector};
 
+use super::late::LateSide;
 use crate::lie::{LieGroup, SE23};
 use crate::model::{ImuIncrement, Transition};
 
@@ -52,7 +53,7 @@ pub trait Side: Copy + Clone + Debug + PartialEq {
 }
 
 /// A side on which a belief moves with an IMU: its error has a transition in blocks.
-pub trait InertialSide: Side {
+pub trait InertialSide: LateSide {
     /// How the error of an inertial state moves with `increment`, from the pose `before` to the pose `after`.
     fn transition(increment: &ImuIncrement, before: &SE23, after: &SE23) -> Transition;
 }

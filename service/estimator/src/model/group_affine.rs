@@ -21,6 +21,12 @@ pub trait Automorphism<G: LieGroup<D>, const D: usize> {
     fn times_differential(&self, a: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
         a * self.differential()
     }
+    /// Makes the symmetric matrix P `M P M^T`.
+    fn congruence(&self, p: &mut SMatrix<f64, D, D>) {
+        let m = self.differential();
+        *p = m * *p * m.transpose();
+        p.fill_lower_triangle_with_upper_triangle();
+    }
 }
 
 /// Motion without force for `dt_s` seconds on SE_2(3): the position advances by `v_w * dt_s`.
@@ -55,6 +61,21 @@ impl Automorphism<SE23, 9> for FreeMotion {
             }
         }
         a
+    }
+
+    /// `dt_s` times the velocity's columns added to those of the position, then the same with the rows.
+    fn congruence(&self, p: &mut SMatrix<f64, 9, 9>) {
+        for column in 6..9 {
+            for row in 0..9 {
+                p[(row, column)] += self.dt_s * p[(row, column - 3)];
+            }
+        }
+        for column in 0..9 {
+            for row in 6..9 {
+                p[(row, column)] += self.dt_s * p[(row - 3, column)];
+            }
+        }
+        p.fill_lower_triangle_with_upper_triangle();
     }
 }
 

@@ -4,6 +4,8 @@
 
 use nalgebra::{SMatrix, Vector3};
 
+use super::drift::Drift;
+use super::group_affine::{Automorphism, FreeMotion};
 use super::imu::{Discretisation, ImuInput, ImuNoise, ImuStep};
 use super::increment::ImuIncrement;
 use super::transition::Transition;
@@ -38,6 +40,13 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
 
     /// Whether a step is group-affine on the whole state, so that F does not depend on the state.
     const IS_GROUP_AFFINE: bool;
+
+    /// phi of its [`free_fall`](Self::free_fall).
+    type FreeMotion: Automorphism<Self, D>;
+
+    /// What `dt_s` seconds under gravity `g_w` (m/s^2) do to the state by themselves, whatever held samples the IMU
+    /// gave meanwhile; `None` where its steps are not group-affine.
+    fn free_fall(g_w: &Vector3<f64>, dt_s: f64) -> Option<Drift<Self, Self::FreeMotion, D>>;
 
     /// The state after one step, and the transition matrix F of the left-invariant error.
     fn transition(&self, step: &ImuStep) -> (Self, SMatrix<f64, D, D>);
@@ -110,6 +119,13 @@ impl InertialState<9> for SE23 {
     }
 
     const IS_GROUP_AFFINE: bool = true;
+
+    type FreeMotion = FreeMotion;
+
+    #[inline]
+    fn free_fall(g_w: &Vector3<f64>, dt_s: f64) -> Option<Drift<Self, FreeMotion, 9>> {
+        Some(Drift::free_fall(g_w, dt_s))
+    }
 
     fn transition(&self, step: &ImuStep) -> (Self, SMatrix<f64, 9, 9>) {
         (step.apply(self), step.step.left_jacobian())

@@ -1,6 +1,6 @@
 //! What moves the state and what observes it.
 //!
-//! [`group_affine`] is the abstract step of \[IS\] (6); [`imu`] makes one from an IMU sample, [`odometry`] one from
+//! [`group_affine`] is the abstract step of \[IS\] (6), [`drift`] its world's share over any time; [`imu`] makes one from an IMU sample, [`odometry`] one from
 //! an increment; [`inertial`] is the interface of states that an IMU drives, with [`nav_state`] the one that
 //! carries biases, and [`pose`] that of all states that have a place in the plane or in space; [`observation`]
 //! holds the sensors. [`mismatch`] and [`inertial_mismatch`] say how the models may be wrong, as the columns of
@@ -8,6 +8,7 @@
 //! odometry as states.
 
 pub mod augmented;
+pub mod drift;
 pub mod group_affine;
 pub mod imu;
 pub mod increment;
@@ -23,6 +24,7 @@ pub mod transition;
 pub mod unknowns;
 
 pub use augmented::Augmented;
+pub use drift::{Drift, Unmoved};
 pub use group_affine::{Automorphism, FreeMotion, GroupAffineStep};
 pub use imu::{Discretisation, ImuInput, ImuNoise, ImuStep};
 pub use increment::ImuIncrement;

@@ -7,6 +7,7 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
+use super::drift::{Drift, Unmoved};
 use super::imu::{ImuNoise, ImuStep};
 use super::inertial::InertialState;
 use super::transition::Transition;
@@ -158,6 +159,13 @@ impl InertialState<15> for NavState {
     }
 
     const IS_GROUP_AFFINE: bool = false;
+
+    type FreeMotion = Unmoved;
+
+    #[inline]
+    fn free_fall(_g_w: &Vector3<f64>, _dt_s: f64) -> Option<Drift<Self, Unmoved, 15>> {
+        None
+    }
 
     fn transition(&self, step: &ImuStep) -> (Self, Matrix15) {
         let (pose, pose_f) = self.pose.transition(step);

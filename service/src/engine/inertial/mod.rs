@@ -1,7 +1,8 @@
 //! The model `imu`: an IMU moves SE_2(3), with biases or without; position, velocity and heading correct it.
 
 use inekf::filter::{
-    Alignment, Belief, InertialSide, Levelled, UpdateError, Verdict, propagate_in_place,
+    Alignment, Belief, InertialSide, LateCorrection, Levelled, UpdateError, Verdict,
+    propagate_in_place,
 };
 use inekf::lie::{LieGroup, SO3};
 use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState, VelocityObservation};
@@ -300,6 +301,24 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G,
         let fused = self.fuse(&mut wide, fix, false)?;
         *belief = wide;
         Ok(fused)
+    }
+
+    /// Where the samples are held constant over their intervals: Euler's gravity depends on how long each of them was.
+    fn carries(&self) -> bool {
+        G::IS_GROUP_AFFINE && self.imu.discretisation == Discretisation::ZeroOrderHold
+    }
+
+    fn carry(
+        &self,
+        before: &Belief<G, S, D>,
+        after: &Belief<G, S, D>,
+        elapsed_ns: u64,
+        now: &Belief<G, S, D>,
+    ) -> (Belief<G, S, D>, f64) {
+        match G::free_fall(&self.imu.g_w, seconds(elapsed_ns)) {
+            Some(drift) => LateCorrection::between(before, after).carried_with_share(&drift, now),
+            None => (*now, 0.0),
+        }
     }
 
     fn place_w(&self, belief: &Belief<G, S, D>) -> Vector3<f64> {

@@ -83,6 +83,23 @@ pub trait PoseFilter<G, const D: usize, const N: usize>: Debug {
     /// The state, doubted by `widening`.
     fn widened(&self, state: &Self::State, widening: &Widening) -> Self::State;
 
+    /// Whether what a fix changes can be [carried](Self::carry) over rows that follow it.
+    fn carries(&self) -> bool {
+        false
+    }
+
+    /// `now`, to which rows and no fix have led from `before`, as if they had led to it from `after`; and the least
+    /// share of a variance of `now` that remains. Only of filters that [carry](Self::carries).
+    fn carry(
+        &self,
+        before: &Self::State,
+        after: &Self::State,
+        now: &Self::State,
+    ) -> (Self::State, f64) {
+        let _ = (before, after);
+        (*now, 0.0)
+    }
+
     /// The pose and its covariance.
     fn belief(&self, state: &Self::State) -> Belief<G, Left, D>;
 

@@ -263,6 +263,20 @@ where
         Ok(fused)
     }
 
+    fn carries(&self) -> bool {
+        self.filter.carries()
+    }
+
+    fn carry(
+        &self,
+        before: &F::State,
+        after: &F::State,
+        _elapsed_ns: u64,
+        now: &F::State,
+    ) -> (F::State, f64) {
+        self.filter.carry(before, after, now)
+    }
+
     fn place_w(&self, state: &F::State) -> Vector3<f64> {
         self.filter.belief(state).mean.in_space().1
     }

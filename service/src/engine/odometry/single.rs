@@ -6,10 +6,12 @@
 //! that the fix does not see (a bias while the body rests: `H d = 0`) goes on as it is.
 
 use inekf::filter::{
-    Belief, Constrained, GainRule, HInfinity, Kalman, Left, Linearised, Side, UpdateError,
-    UpdateOptions, Verdict, update, update_with,
+    Belief, Constrained, GainRule, HInfinity, Kalman, LateCorrection, LateSide, Left, Linearised,
+    Side, UpdateError, UpdateOptions, Verdict, update, update_with,
 };
-use inekf::model::{Declared, Observation, OdometryStep, OutputMismatch, Points, ProcessColumns};
+use inekf::model::{
+    Declared, Drift, Observation, OdometryStep, OutputMismatch, Points, ProcessColumns,
+};
 use inekf_shared::message::MAX_MISMATCHES;
 use nalgebra::{SMatrix, SVector};
 
@@ -127,7 +129,7 @@ impl<S: Side, const D: usize> Single<S, D> {
 impl<G, S, const D: usize, const N: usize> PoseFilter<G, D, N> for Single<S, D>
 where
     G: Vehicle<D, N>,
-    S: Side,
+    S: LateSide,
 {
     type State = SingleState<G, S, D>;
 
@@ -191,6 +193,27 @@ where
             belief: Belief::from_left_covariance(state.belief.mean, covariance),
             ..*state
         }
+    }
+
+    /// With constraints the way since the last update would have to be gathered anew.
+    fn carries(&self) -> bool {
+        self.gain != Gain::Constrained
+    }
+
+    fn carry(
+        &self,
+        before: &Self::State,
+        after: &Self::State,
+        now: &Self::State,
+    ) -> (Self::State, f64) {
+        let (belief, share) = LateCorrection::between(&before.belief, &after.belief)
+            .carried_with_share(&Drift::none(), &now.belief);
+        let carried = SingleState {
+            belief,
+            active: after.active,
+            ..*now
+        };
+        (carried, share)
     }
 
     fn belief(&self, state: &Self::State) -> Belief<G, Left, D> {

@@ -1,8 +1,11 @@
 //! The propagation by blocks against the one by general matrix products, which
 //! `filter_side.rs` holds to numerical derivatives: every side, 9 and 15 states, both schemes, and the corners
-//! of the input.
+//! of the input. [`late`] holds corrections of the past, carried to now, to a replay.
 
+#[path = "../common/mod.rs"]
 mod common;
+
+mod late;
 
 use common::{
     GRAVITY_W, NOISE, any_belief, any_input, any_state, assert_same_covariance, assert_same_pose,

@@ -1,0 +1,232 @@
+//! A correction of the past, given to the belief of now without going back: the cost does not depend on how long ago
+//! it was.
+//!
+//! Between two group-affine beliefs that no measurement separates, errors move by a linear map that no estimate enters
+//! (\[IS\], Proposition 1). Whatever a measurement that came late does to the belief then, `(chi, P)` becoming
+//! `(chi+, P+)`, therefore does the same to the belief now, carried along by that map. With `chi_now = W phi(chi) U`
+//! ([`Drift`], M the differential of phi), exactly:
+//!
+//! ```text
+//! chi_now+ = W phi(chi+) U
+//! left     P_now+ = P_now - F (P - P+) F^T                          F = Ad_{U^-1} M
+//! right    P_now+ = C_now (P_now - F (P - C^-1 P+ C^-T) F^T) C_now^T    F = Ad_W M
+//! ```
+//!
+//! C = `Ad(chi+ chi^-1)` and `C_now = Ad(chi_now+ chi_now^-1)`: in world coordinates the noise of the steps is turned
+//! with the body, and so with its correction; taking P+ back to where P was and the whole forth again turns it alike.
+//! In the additive error of the EKF, which between measurements is a linear image of the left one, the left formula
+//! holds there. For the Kalman update `chi_now+ = chi_now exp(F K z)` and `P - P+ = K H P`; nothing here asks what
+//! kind of update it was, iterated or not.
+//!
+//! U and F come from the two means alone, so that nothing is accumulated that could drift, over milliseconds or hours.
+//! Biases (then F depends on them), or an update in between, need a replay.
+
+use core::marker::PhantomData;
+
+use nalgebra::SMatrix;
+
+use super::additive::Additive;
+use super::belief::Belief;
+use super::covariance::Covariance;
+use super::side::{Left, Right, Side};
+use crate::lie::LieGroup;
+use crate::model::{Automorphism, Drift};
+
+/// The least share of a variance that may remain for a subtraction to be as good as a replay: with less, more than two
+/// digits go with what is taken away.
+pub const LEAST_SHARE: f64 = 0.01;
+
+/// What a measurement changed at its own time, to be carried on to later beliefs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LateCorrection<G, S, const D: usize> {
+    /// chi.
+    before: G,
+    /// chi+.
+    after: G,
+    /// What P lost, D x D, in the coordinates of the error around chi; see [`LateSide::lost`].
+    lost: SMatrix<f64, D, D>,
+    side: PhantomData<S>,
+}
+
+impl<G: LieGroup<D>, S: LateSide, const D: usize> LateCorrection<G, S, D> {
+    /// What changed from `before` the measurement to `after` it.
+    pub fn between(before: &Belief<G, S, D>, after: &Belief<G, S, D>) -> Self {
+        Self {
+            before: before.mean,
+            after: after.mean,
+            lost: S::lost(before, after),
+            side: PhantomData,
+        }
+    }
+
+    /// The belief `now`, which `drift` and what the body felt have led to from the belief before the measurement, as
+    /// if they had led to it from the one after. Biases and measurements in between have no place in this.
+    ///
+    /// `None` where less than [`LEAST_SHARE`] of a variance remains, so that the subtraction would lose digits: replay.
+    pub fn carried<A: Automorphism<G, D>>(
+        &self,
+        drift: &Drift<G, A, D>,
+        now: &Belief<G, S, D>,
+    ) -> Option<Belief<G, S, D>> {
+        let (belief, share) = self.carried_with_share(drift, now);
+        (share >= LEAST_SHARE).then_some(belief)
+    }
+
+    /// [`carried`](Self::carried) in any case, with the least share of a variance that remains.
+    pub fn carried_with_share<A: Automorphism<G, D>>(
+        &self,
+        drift: &Drift<G, A, D>,
+        now: &Belief<G, S, D>,
+    ) -> (Belief<G, S, D>, f64) {
+        let body = drift.body_between(&self.before, &now.mean);
+        let mean = drift.apply(&self.after).compose(&body);
+        let (remaining, share) = S::remaining(&self.lost, drift, &body, now);
+        (S::recentred(&remaining, now, mean), share)
+    }
+}
+
+/// `P - lost`, and the least share of a variance that remains; 0 if that is not a number.
+fn less<const D: usize>(p: &Covariance<D>, lost: &SMatrix<f64, D, D>) -> (Covariance<D>, f64) {
+    let mut remaining = *p;
+    let mut share = f64::INFINITY;
+    remaining.change_symmetrically(|remaining| {
+        *remaining -= lost;
+        for i in 0..D {
+            let (left, whole) = (remaining[(i, i)], p.matrix()[(i, i)]);
+            // What was known exactly stays so.
+            if left != whole {
+                share = if left >= 0.0 {
+                    share.min(left / whole)
+                } else {
+                    0.0
+                };
+            }
+        }
+    });
+    (remaining, share)
+}
+
+/// A side on which a correction is carried on in time.
+pub trait LateSide: Side {
+    /// What the covariance lost from `before` to `after` a measurement, in coordinates around the mean before.
+    fn lost<G: LieGroup<D>, const D: usize>(
+        before: &Belief<G, Self, D>,
+        after: &Belief<G, Self, D>,
+    ) -> SMatrix<f64, D, D>;
+
+    /// What is left of the covariance of `now` of such a loss, in coordinates around its mean, after `drift` and the
+    /// motion `body`, and the least share of a variance that this is.
+    fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
+        lost: &SMatrix<f64, D, D>,
+        drift: &Drift<G, A, D>,
+        body: &G,
+        now: &Belief<G, Self, D>,
+    ) -> (Covariance<D>, f64);
+
+    /// The belief at `mean` whose covariance is `remaining` in coordinates around the mean of `now`.
+    fn recentred<G: LieGroup<D>, const D: usize>(
+        remaining: &Covariance<D>,
+        now: &Belief<G, Self, D>,
+        mean: G,
+    ) -> Belief<G, Self, D>;
+}
+
+/// `F lost F^T` of the left-invariant error.
+fn left_loss<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
+    lost: &SMatrix<f64, D, D>,
+    drift: &Drift<G, A, D>,
+    body: &G,
+) -> SMatrix<f64, D, D> {
+    let mut lost = *lost;
+    drift.automorphism.congruence(&mut lost);
+    G::congruence(&mut lost, &body.inverse().adjoint());
+    lost
+}
+
+impl LateSide for Left {
+    #[inline]
+    fn lost<G: LieGroup<D>, const D: usize>(
+        before: &Belief<G, Self, D>,
+        after: &Belief<G, Self, D>,
+    ) -> SMatrix<f64, D, D> {
+        before.covariance.matrix() - after.covariance.matrix()
+    }
+
+    #[inline]
+    fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
+        lost: &SMatrix<f64, D, D>,
+        drift: &Drift<G, A, D>,
+        body: &G,
+        now: &Belief<G, Self, D>,
+    ) -> (Covariance<D>, f64) {
+        less(&now.covariance, &left_loss(lost, drift, body))
+    }
+
+    #[inline]
+    fn recentred<G: LieGroup<D>, const D: usize>(
+        remaining: &Covariance<D>,
+        _now: &Belief<G, Self, D>,
+        mean: G,
+    ) -> Belief<G, Self, D> {
+        Belief::new(mean, *remaining)
+    }
+}
+
+impl LateSide for Right {
+    fn lost<G: LieGroup<D>, const D: usize>(
+        before: &Belief<G, Self, D>,
+        after: &Belief<G, Self, D>,
+    ) -> SMatrix<f64, D, D> {
+        let mut kept = after.covariance;
+        kept.transform_by::<G>(&before.mean.compose(&after.mean.inverse()).adjoint());
+        before.covariance.matrix() - kept.matrix()
+    }
+
+    fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
+        lost: &SMatrix<f64, D, D>,
+        drift: &Drift<G, A, D>,
+        _body: &G,
+        now: &Belief<G, Self, D>,
+    ) -> (Covariance<D>, f64) {
+        let mut lost = *lost;
+        drift.automorphism.congruence(&mut lost);
+        G::congruence(&mut lost, &drift.world.adjoint());
+        less(&now.covariance, &lost)
+    }
+
+    fn recentred<G: LieGroup<D>, const D: usize>(
+        remaining: &Covariance<D>,
+        now: &Belief<G, Self, D>,
+        mean: G,
+    ) -> Belief<G, Self, D> {
+        let mut covariance = *remaining;
+        covariance.transform_by::<G>(&mean.compose(&now.mean.inverse()).adjoint());
+        Belief::new(mean, covariance)
+    }
+}
+
+impl LateSide for Additive {
+    fn lost<G: LieGroup<D>, const D: usize>(
+        before: &Belief<G, Self, D>,
+        after: &Belief<G, Self, D>,
+    ) -> SMatrix<f64, D, D> {
+        before.left_covariance().matrix() - after.left_covariance().matrix()
+    }
+
+    fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
+        lost: &SMatrix<f64, D, D>,
+        drift: &Drift<G, A, D>,
+        body: &G,
+        now: &Belief<G, Self, D>,
+    ) -> (Covariance<D>, f64) {
+        less(&now.left_covariance(), &left_loss(lost, drift, body))
+    }
+
+    fn recentred<G: LieGroup<D>, const D: usize>(
+        remaining: &Covariance<D>,
+        _now: &Belief<G, Self, D>,
+        mean: G,
+    ) -> Belief<G, Self, D> {
+        Belief::from_left_covariance(mean, *remaining)
+    }
+}

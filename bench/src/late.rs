@@ -237,8 +237,8 @@ fn drawn(rows: &[Row]) -> anyhow::Result<String> {
         name: "Time of a fix (ns)".to_owned(),
         scale: Scale::Logarithmic,
         series: vec![
-            series("carried", palette::SERIES[0], |row| row.carried_ns),
-            series("replayed", palette::SERIES[1], |row| row.replayed_ns),
+            series("carried", palette::SERIES[0].into(), |row| row.carried_ns),
+            series("replayed", palette::SERIES[1].into(), |row| row.replayed_ns),
         ],
     };
     figures::panels("A late fix", "Samples of delay (power of ten)", &[panel])

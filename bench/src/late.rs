@@ -18,7 +18,6 @@ use inekf::lie::{LieGroup, SE23, SO3};
 use inekf::model::{Discretisation, Drift, ImuInput, ImuNoise, PositionObservation};
 use inekf_client::plot::palette;
 use nalgebra::{SMatrix, SVector, Vector3};
-use plotters::style::Color;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -238,12 +237,8 @@ fn drawn(rows: &[Row]) -> anyhow::Result<String> {
         name: "Time of a fix (ns)".to_owned(),
         scale: Scale::Logarithmic,
         series: vec![
-            series("carried", palette::SERIES[0].to_rgba(), |row| {
-                row.carried_ns
-            }),
-            series("replayed", palette::SERIES[1].to_rgba(), |row| {
-                row.replayed_ns
-            }),
+            series("carried", palette::SERIES[0].into(), |row| row.carried_ns),
+            series("replayed", palette::SERIES[1].into(), |row| row.replayed_ns),
         ],
     };
     figures::panels("A late fix", "Samples of delay (power of ten)", &[panel])

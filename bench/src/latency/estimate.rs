@@ -13,7 +13,7 @@ use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::{
     ESTIMATE_PROPAGATED, ESTIMATE_UPDATED, EstimateSe2, EstimateSe23, Health, StateVector,
 };
-use inekf_shared::transport::{self, Subscriber};
+use inekf_shared::transport::{self, Node, Subscriber};
 use tempfile::TempDir;
 
 use super::mechanism::Wait;
@@ -44,6 +44,8 @@ pub struct Estimate<E: model::Estimate> {
     inside_ns: u64,
     daemon: Daemon,
     health: Subscriber<Health>,
+    // After the port that was made on it, and after the daemon.
+    _node: Node,
     _config: TempDir,
 }
 
@@ -181,6 +183,7 @@ impl<E: model::Estimate> Estimate<E> {
             inside_ns: 0,
             daemon,
             health,
+            _node: node,
             _config: folder,
         })
     }

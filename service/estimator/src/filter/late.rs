@@ -32,9 +32,9 @@ use super::side::{Left, Right, Side};
 use crate::lie::LieGroup;
 use crate::model::{Automorphism, Drift};
 
-/// The least share of a variance that may remain for a subtraction to be as good as a replay: with less, more than two
-/// digits go with what is taken away.
-pub const LEAST_SHARE: f64 = 0.01;
+/// The least share of a variance that may remain for a subtraction to be as good as a replay: with less, more than a
+/// digit and a half go with what is taken away.
+pub const LEAST_SHARE: f64 = 0.03;
 
 /// What a measurement changed at its own time, to be carried on to later beliefs.
 #[derive(Clone, Copy, Debug, PartialEq)]

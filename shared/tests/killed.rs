@@ -5,6 +5,7 @@ mod common;
 use std::env;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::time::{Duration, SystemTime};
 
 use common::Isolated;
 use inekf_shared::message::*;
@@ -108,5 +109,31 @@ fn the_places_of_a_killed_daemon_are_free_for_the_next() {
         assert_eq!(latest.as_ref().unwrap().read().head.seq, 9);
     }
     drop((latest, estimates, control, node));
+    memory.assert_no_file_is_left();
+}
+
+/// Whoever cleans up after a killed process may be killed as well: after it has removed the lock, and nothing else.
+#[test]
+fn what_a_killed_cleaner_left_half_removed_is_swept() {
+    let memory = Isolated::new();
+    let mut child = start_child(&memory);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let locks = memory.root_files();
+    let locks = locks.iter().filter(|path| path.ends_with("_owner_lock"));
+    let mut removed = 0;
+    for lock in locks {
+        std::fs::remove_file(lock).unwrap();
+        removed += 1;
+    }
+    assert_eq!(removed, 1);
+    // What is younger than two seconds may be in the making.
+    let long_ago = SystemTime::now() - Duration::from_secs(10);
+    let nodes = memory.root.path().join("nodes");
+    for entry in std::fs::read_dir(nodes).unwrap() {
+        let file = std::fs::File::open(entry.unwrap().path());
+        file.unwrap().set_modified(long_ago).unwrap();
+    }
+    drop(memory.node());
     memory.assert_no_file_is_left();
 }

@@ -37,6 +37,9 @@ fn internal(cause: String) -> TransportError {
     }
 }
 
+/// What iceoryx2 0.10 calls the lock on the state of a node.
+const LOCK_SUFFIX: &str = "_owner_lock";
+
 fn each_node(
     config: &Config,
     mut take: impl FnMut(NodeState<ipc::Service>),
@@ -92,6 +95,7 @@ pub(super) fn node_ids(config: &Config) -> Result<Vec<NodeId>, TransportError> {
     each_node(config, |state| {
         let (alive, has_details) = match &state {
             NodeState::Dead(view) => (false, view.details().is_some()),
+            NodeState::Undefined(id) if is_half_removed(config, id.value()) => (false, false),
             _ => (true, true),
         };
         let id = state.node_id().value();
@@ -102,6 +106,16 @@ pub(super) fn node_ids(config: &Config) -> Result<Vec<NodeId>, TransportError> {
         });
     })?;
     Ok(ids)
+}
+
+/// Whether the lock by which a node is known to live has been removed, and its state has not: who cleaned up after it was
+/// killed at that moment. iceoryx2 cannot say then whether the node lives, and never cleans up after it; one that lives
+/// has its lock from before its state to after it.
+fn is_half_removed(config: &Config, id: u128) -> bool {
+    let global = &config.global;
+    let state = format!("{}{id}{}", global.prefix, global.node.monitor_suffix);
+    let folder = PathBuf::from(global.node_dir().to_string());
+    folder.join(&state).exists() && !folder.join(format!("{state}{LOCK_SUFFIX}")).exists()
 }
 
 /// Removes what dead nodes left. Returns how many were removed and how many could not be.

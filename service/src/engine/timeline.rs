@@ -3,7 +3,7 @@
 //! A ring of knots (one per sample: the sample and the state after every fix due at its stamp)
 //! reaches back over a bounded window. A fix between two samples splits the interval. A fix that
 //! comes late goes back to the last knot before it and the samples since are replayed: the result
-//! is bit for bit what it would have been on time. Where [`carrying`] what it changes to the newest
+//! is bit for bit what it would have been on time. Where carrying (`timeline/carrying.rs`) what it changes to the newest
 //! state is exact and cheaper, that is done instead. Nothing here allocates after construction.
 
 use std::collections::VecDeque;

@@ -310,7 +310,7 @@ fn another_layout_under_the_same_name_is_a_clear_error() {
     let text = transport::control(&node, &instance())
         .unwrap_err()
         .to_string();
-    for part in ["inekf.ControlResponse.v5", "inekf.Health.v4 (704 bytes"] {
+    for part in ["inekf.ControlResponse.v5", "inekf.Health.v4 (720 bytes"] {
         assert!(text.contains(part), "{text}");
     }
 }

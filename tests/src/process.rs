@@ -214,6 +214,11 @@ impl Daemon {
             .to_owned()
     }
 
+    /// Sends it a signal.
+    pub fn signal(&self, signal: Signal) {
+        self.running.signal(signal);
+    }
+
     /// Stops it with a signal and waits for its end.
     pub fn stop_with(self, signal: Signal) -> Ended {
         self.running.signal(signal);

@@ -5,6 +5,7 @@ use std::sync::mpsc::channel;
 
 use inekf_tests::memory::Memory;
 use inekf_tests::process::Daemon;
+use rustix::process::Signal;
 
 use super::tracer::trace;
 use super::{CONFIG, FIX_EVERY, INSTANCE, WARM_UP, feed, warm_link};
@@ -30,8 +31,12 @@ fn from_samples_to_estimates_a_spinning_daemon_makes_no_system_call() {
         let estimates = feed(&mut link, WARM_UP + 1..=WARM_UP + STEPS);
         counts.store(false, Ordering::SeqCst);
         assert_eq!(estimates, STEPS + STEPS / FIX_EVERY);
+        // The tracer first: who waits for a traced process may be given the stop that the tracer waits for, and then
+        // both wait for ever.
+        daemon.signal(Signal::TERM);
+        let seen = tracer.join().expect("the tracer ends");
         daemon.stop();
-        Some(tracer.join().expect("the tracer ends"))
+        Some(seen)
     });
     let Some(seen) = seen else { return };
     assert!(

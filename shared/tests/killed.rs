@@ -3,8 +3,11 @@
 mod common;
 
 use std::env;
+use std::fs::{File, Permissions};
 use std::io::{BufRead, BufReader};
+use std::os::unix::fs::PermissionsExt;
 use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::channel;
 use std::time::{Duration, SystemTime};
 
 use common::Isolated;
@@ -12,7 +15,7 @@ use inekf_shared::message::*;
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{
     self, ControlServer, IPC_PREFIX_VARIABLE, IPC_ROOT_VARIABLE, LatestWriter, Node, Publisher,
-    Subscriber, TransportError, WakeListener,
+    Subscriber, TransportError, WakeListener, Watched,
 };
 
 const READY: &str = "all ports open";
@@ -136,4 +139,104 @@ fn what_a_killed_cleaner_left_half_removed_is_swept() {
     }
     drop(memory.node());
     memory.assert_no_file_is_left();
+}
+
+/// Runs it on a thread of its own, for it may never come back.
+fn within_a_while<T: Send + 'static>(what: &str, run: impl FnOnce() -> T + Send + 'static) -> T {
+    let (tell, told) = channel();
+    std::thread::spawn(move || tell.send(run()));
+    told.recv_timeout(Duration::from_secs(30))
+        .unwrap_or_else(|_| panic!("waited in vain for {what}"))
+}
+
+/// Leaves a segment as a process that was killed over its making does: write-only, and with this size.
+fn leave_half_made(name: &str, bytes: u64) {
+    let path = format!("/dev/shm/{name}");
+    let _ = std::fs::remove_file(&path);
+    let file = File::create_new(&path).unwrap();
+    file.set_len(bytes).unwrap();
+    file.set_permissions(Permissions::from_mode(0o200)).unwrap();
+}
+
+#[test]
+fn a_count_of_nodes_that_was_left_half_made_keeps_no_node_from_being_made() {
+    let memory = Isolated::new();
+    let node = memory.node();
+    let files = memory.shared_memory_files();
+    let counts = files.iter().filter(|name| name.ends_with(".global_mgmt"));
+    let [count] = counts.collect::<Vec<_>>()[..] else {
+        panic!("{files:?}");
+    };
+    drop(node);
+    memory.assert_no_file_is_left();
+    for bytes in [0, 16] {
+        leave_half_made(count, bytes);
+        let config = memory.config.clone();
+        within_a_while("a node", move || {
+            drop(transport::open_node_with("test", &config).unwrap());
+        });
+        memory.assert_no_file_is_left();
+    }
+}
+
+#[test]
+fn a_service_that_was_left_half_made_is_made_anew_beside_those_who_have_it_open() {
+    for bytes in [0, 4096] {
+        let memory = Isolated::new();
+        let node = memory.node();
+        let instance = Instance::default();
+        let before = memory.shared_memory_files();
+        let _estimates = transport::estimate::<EstimateSe23>(&node, &instance).unwrap();
+        let watched = Watched::services_of(&node).unwrap();
+        assert!(watched.is_intact());
+        let mut made = memory.shared_memory_files();
+        made.retain(|name| name.ends_with(".dynamic") && !before.contains(name));
+        let [dynamic] = &made[..] else {
+            panic!("{made:?}");
+        };
+        leave_half_made(dynamic, bytes);
+        let config = memory.config.clone();
+        let other = within_a_while("a service", move || {
+            let node = transport::open_node_with("other", &config).unwrap();
+            let opened = transport::estimate::<EstimateSe23>(&node, &Instance::default());
+            let watched = Watched::services_of(&node).unwrap();
+            opened.map(|_| watched.is_intact())
+        });
+        assert!(other.unwrap());
+        // Who had it open learns that it is alone.
+        assert!(!watched.is_intact());
+    }
+}
+
+/// Others may remove or replace what a process has just opened before it first looks.
+#[test]
+fn what_went_before_it_was_first_looked_at_counts_as_gone() {
+    let memory = Isolated::new();
+    let node = memory.node();
+    let instance = Instance::default();
+    let _estimates = transport::estimate::<EstimateSe23>(&node, &instance).unwrap();
+    let is_intact = || Watched::services_of(&node).unwrap().is_intact();
+    assert!(is_intact());
+    let files = memory.root_files();
+    let description = files.iter().find(|path| path.ends_with(".service"));
+    let description = description.unwrap_or_else(|| panic!("{files:?}"));
+    let text = std::fs::read_to_string(description).unwrap();
+    std::fs::remove_file(description).unwrap();
+    assert!(!is_intact());
+    // Another service of the same name.
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let id = lines
+        .iter_mut()
+        .find(|line| line.starts_with("unique_value"));
+    *id.unwrap_or_else(|| panic!("{text}")) = "unique_value = 12345".to_owned();
+    std::fs::write(description, lines.join("\n")).unwrap();
+    assert!(!is_intact());
+    std::fs::write(description, &text).unwrap();
+    assert!(is_intact());
+    // Its shared part.
+    let files = memory.shared_memory_files();
+    let dynamic = files.iter().find(|name| name.ends_with(".dynamic"));
+    let dynamic = dynamic.unwrap_or_else(|| panic!("{files:?}"));
+    std::fs::remove_file(format!("/dev/shm/{dynamic}")).unwrap();
+    assert!(!is_intact());
 }

@@ -16,6 +16,7 @@ const PERIOD: Duration = Duration::from_millis(250);
 /// The default looks after nothing.
 #[derive(Debug, Default)]
 pub struct Guard {
+    watched: Arc<Watched>,
     gone: Arc<AtomicBool>,
     /// Dropped first: it ends the thread.
     awake: Option<Sender<()>>,
@@ -25,12 +26,14 @@ pub struct Guard {
 impl Guard {
     /// Looks after these files from now on. If there can be no thread, nobody does, and the log says so.
     pub fn of(watched: Watched) -> Self {
+        let watched = Arc::new(watched);
+        let looked_after = Arc::clone(&watched);
         let gone = Arc::new(AtomicBool::new(false));
         let (awake, asleep) = channel::<()>();
         let told = Arc::clone(&gone);
         let look = move || {
             while asleep.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
-                if !watched.is_intact() {
+                if !looked_after.is_intact() {
                     told.store(true, Ordering::Relaxed);
                     return;
                 }
@@ -41,10 +44,16 @@ impl Guard {
             warn!("no thread to look after the files in shared memory: {error}");
         }
         Self {
+            watched,
             gone,
             awake: Some(awake),
             thread: thread.ok(),
         }
+    }
+
+    /// Ends it; what it looked after.
+    pub fn end(mut self) -> Arc<Watched> {
+        core::mem::take(&mut self.watched)
     }
 
     /// Whether a file has gone. One load.

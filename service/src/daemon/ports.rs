@@ -196,14 +196,20 @@ impl<M: Model> Ports<M> {
         })
     }
 
-    /// Has an eye on the files from now on: call it once nothing is open any more that is closed again, and if this is the only vehicle of its process: those of several cannot be told
-    /// apart.
+    /// Has an eye on the files from now on: call it once nothing is open any more that is closed again, and if this is
+    /// the only vehicle of its process: those of several cannot be told apart.
     ///
     /// # Errors
     /// [`TransportError::Internal`] if the folders cannot be read.
     pub fn watch_files(&mut self) -> Result<(), TransportError> {
         self.guard = Guard::of(Watched::of(&self.node)?);
         Ok(())
+    }
+
+    /// Lets go of them, and of nothing that others have made in their place since.
+    pub fn let_go(mut self) {
+        let watched = core::mem::take(&mut self.guard).end();
+        watched.sparing_others(|| drop(self));
     }
 
     /// Whether somebody has removed files that others need in order to attach.

@@ -396,7 +396,7 @@ impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M
             ..
         } = *self;
         // Their places first, or the new ones would take them for another daemon's.
-        drop(ports);
+        ports.let_go();
         let mut is_said = false;
         loop {
             match open_anew(instance, &terms) {

@@ -13,6 +13,7 @@ use iceoryx2::service::builder::request_response::{
     RequestResponseCreateError, RequestResponseOpenError, RequestResponseOpenOrCreateError,
 };
 
+use super::sweep::ABANDONED_AFTER;
 use super::{Config, TransportError, sweep};
 
 /// How long a failure that may pass by itself is tried again. Races between processes that create, open and remove a
@@ -133,19 +134,28 @@ impl Classify for BlackboardError {
 }
 
 /// Tries until it succeeds, fails for good, or a passing failure has lasted for [`RETRY_FOR`]. If it then looks like
-/// what a killed process left, sweeps and tries as long once more.
+/// what a killed process left, sweeps and tries as long once more; what is half made only counts as left after a time,
+/// so until then again.
 pub(super) fn retry<T, E: Classify>(
     config: &Config,
     mut attempt: impl FnMut() -> Result<T, E>,
 ) -> Result<T, E> {
-    let outcome = try_for_a_while(&mut attempt);
-    match outcome {
-        Err(error) if error.cause().may_be_swept() => {
-            // If it cannot be swept, the second failure is the one to report.
-            let _ = sweep(config);
-            try_for_a_while(&mut attempt)
+    let started = Instant::now();
+    let mut outcome = try_for_a_while(&mut attempt);
+    loop {
+        let is_old = started.elapsed() > ABANDONED_AFTER;
+        match outcome {
+            Err(error) if error.cause().may_be_swept() => {
+                // If it cannot be swept, the next failure is the one to report.
+                let _ = sweep(config);
+                outcome = try_for_a_while(&mut attempt);
+                match outcome {
+                    Err(error) if error.cause() == Cause::HalfCreated && !is_old => {}
+                    outcome => return outcome,
+                }
+            }
+            outcome => return outcome,
         }
-        outcome => outcome,
     }
 }
 

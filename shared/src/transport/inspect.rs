@@ -148,7 +148,7 @@ pub fn shared_memory_files(config: &Config) -> io::Result<Vec<(PathBuf, u64)>> {
 }
 
 /// The files of `folder` whose names start with `prefix`; none if there is no such folder.
-fn files(folder: &Path, prefix: &str) -> io::Result<Vec<(PathBuf, fs::Metadata)>> {
+pub(super) fn files(folder: &Path, prefix: &str) -> io::Result<Vec<(PathBuf, fs::Metadata)>> {
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries?,

@@ -105,6 +105,7 @@ mod open;
 mod outlet;
 mod reserve;
 mod service;
+mod stillborn;
 mod sweep;
 mod watched;
 

@@ -1,16 +1,26 @@
 //! Nodes, and where their files are.
 
+use core::cell::RefCell;
 use core::ops::Deref;
+use core::time::Duration;
 use std::env::{self, VarError};
+use std::sync::Arc;
+use std::thread::sleep;
+use std::time::Instant;
 
 use iceoryx2::config::Config;
 use iceoryx2::prelude::{
-    CallbackProgression, FileName, NodeBuilder, NodeName, Path, SemanticString, SignalHandlingMode,
-    ipc,
+    CallbackProgression, FileName, NodeBuilder, NodeName, Path, PortFactory, SemanticString,
+    SignalHandlingMode, ipc,
 };
 
 use super::reserve::{LEAST_FREE, require_descriptors, require_shared_memory};
+use super::stillborn::{self, Warden};
 use super::{TransportError, sweep};
+
+/// How long a node is tried to be made while there is something half made in its way.
+const PATIENCE: Duration = Duration::from_secs(3);
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 type IpcNode = iceoryx2::node::Node<ipc::Service>;
 
@@ -21,8 +31,30 @@ type IpcNode = iceoryx2::node::Node<ipc::Service>;
 #[derive(Debug)]
 pub struct Node {
     node: IpcNode,
+    /// The services that were opened on it: hash of the name, and id.
+    opened: RefCell<Vec<(String, u128)>>,
     // After the node: fields are dropped in the order of their declaration.
     _counter: NodeCounter,
+    // To the end: ports that outlive this hold the node itself, and may meet such segments too.
+    _warden: Arc<Warden>,
+}
+
+impl Node {
+    /// Notes that a service has been opened on it.
+    pub(super) fn note(&self, service: &impl PortFactory) {
+        let hash = service.service_hash().as_str().to_owned();
+        let id = service.unique_service_id().value();
+        let mut opened = self.opened.borrow_mut();
+        opened.retain(|(known, _)| *known != hash);
+        opened.push((hash, id));
+    }
+
+    /// The id of the service with this hash, if it was opened on this node.
+    pub(super) fn opened(&self, hash: &str) -> Option<u128> {
+        let opened = self.opened.borrow();
+        let found = opened.iter().find(|(known, _)| known == hash);
+        found.map(|(_, id)| *id)
+    }
 }
 
 impl Deref for Node {
@@ -177,14 +209,28 @@ fn create(name: &str, config: &Config) -> Result<Node, TransportError> {
     };
     let node_name = NodeName::new(name).map_err(|error| refuse(format!("{error:?}")))?;
     require_shared_memory(LEAST_FREE)?;
-    let node = NodeBuilder::new()
-        .name(&node_name)
-        .config(config)
-        .signal_handling_mode(SignalHandlingMode::Disabled)
-        .create::<ipc::Service>()
-        .map_err(|error| refuse(format!("{error:?}")))?;
+    // Before the node, which may have to wait for it.
+    let warden = Warden::of(config);
+    let started = Instant::now();
+    let node = loop {
+        let created = NodeBuilder::new()
+            .name(&node_name)
+            .config(config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>();
+        match created {
+            Ok(node) => break node,
+            // The count of nodes may have been left half made; it goes away soon.
+            Err(_) if started.elapsed() < PATIENCE && stillborn::is_there(config) => {
+                sleep(LOOK_EVERY);
+            }
+            Err(error) => return Err(refuse(format!("{error:?}"))),
+        }
+    };
     Ok(Node {
         node,
+        opened: RefCell::default(),
         _counter: NodeCounter(config.clone()),
+        _warden: warden,
     })
 }

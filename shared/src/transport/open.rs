@@ -203,6 +203,7 @@ fn pub_sub<M: Message>(
             || describe::<M>(),
         )
     })?;
+    node.note(&factory);
     Ok(PubSub::new(service, qos, node.config().clone(), factory))
 }
 
@@ -245,6 +246,7 @@ pub fn control(node: &Node, instance: &Instance) -> Result<Control, TransportErr
             },
         )
     })?;
+    node.note(&factory);
     Ok(Control::new(service, factory))
 }
 
@@ -270,6 +272,7 @@ pub fn wake(node: &Node, instance: &Instance) -> Result<Wake, TransportError> {
     };
     let factory = retry(node.config(), open)
         .map_err(|error| refuse(node, error, &name, MessagingPattern::Event, String::new))?;
+    node.note(&factory);
     Ok(Wake::new(service, factory))
 }
 
@@ -305,6 +308,7 @@ pub fn latest<E: EstimateMessage>(
             describe::<E>()
         })
     })?;
+    node.note(&factory);
     Ok(Latest::new(service, factory))
 }
 
@@ -335,6 +339,7 @@ pub fn open_latest<E: EstimateMessage>(
             describe::<E>()
         })
     })?;
+    node.note(&factory);
     Ok(Latest::new(service, factory))
 }
 

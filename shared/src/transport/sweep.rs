@@ -15,21 +15,20 @@
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io;
-use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
 use super::inspect::{self, SHARED_MEMORY};
+use super::stillborn::is_complete;
 use super::{Config, TransportError};
 
 /// A node or a service is made within milliseconds: a half-made one that is older was left by a process that died.
-const ABANDONED_AFTER: Duration = Duration::from_secs(2);
+pub(super) const ABANDONED_AFTER: Duration = Duration::from_secs(2);
 /// How long another process may sweep before this one goes without.
 const PATIENCE: Duration = Duration::from_secs(3);
 const LOOK_EVERY: Duration = Duration::from_millis(5);
-/// A shared-memory segment is readable once it is complete.
-const OWNER_READ: u32 = 0o400;
 /// Digits of the hash of a type, with which the names of segments begin; an id has one less at most.
 const HASH_LEN: usize = 40;
 /// Permissions of a service's description while it is being written; it is finished read-only.
@@ -121,6 +120,7 @@ fn abandoned_services(config: &Config) -> Result<Vec<PathBuf>, TransportError> {
     Ok(services
         .into_iter()
         .filter(abandoned)
+        .filter(Entry::is_as_listed)
         .map(|service| service.path)
         .collect())
 }
@@ -145,7 +145,7 @@ fn hangs_half_made(config: &Config, service: &Entry) -> bool {
         return false;
     };
     let segment = segments.iter().find(|segment| ids(&segment.stem) == [id]);
-    segment.is_none_or(|segment| segment.metadata.permissions().mode() & OWNER_READ == 0)
+    segment.is_none_or(|segment| !is_complete(&segment.metadata))
 }
 
 /// The id of a service out of its description (TOML), where it stands in two halves.
@@ -309,6 +309,16 @@ struct Entry {
     /// The name without prefix and suffix.
     stem: String,
     metadata: Metadata,
+}
+
+impl Entry {
+    /// Whether it is still the file that was listed, and not another that has taken its name since.
+    fn is_as_listed(&self) -> bool {
+        fs::symlink_metadata(&self.path).is_ok_and(|now| {
+            let which = |metadata: &Metadata| (metadata.dev(), metadata.ino(), metadata.ctime());
+            which(&now) == which(&self.metadata)
+        })
+    }
 }
 
 /// The files of a folder with this prefix and this suffix.

@@ -3,6 +3,7 @@
 //! Shared memory stays usable for those who have it mapped after its file was removed; nothing fails, but nobody new
 //! finds it. A long-lived process looks now and then whether its files are still there.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -16,29 +17,52 @@ use crate::clock::monotonic_ns;
 #[derive(Clone, Debug, Default)]
 pub struct Watched(Vec<Seen>);
 
-/// A file as it was: its place, and which file of that name it is.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A file that should be there: its place, and which file of that name it is; none if it had gone before it was seen.
+#[derive(Clone, Debug)]
 struct Seen {
     path: PathBuf,
+    which: Option<Which>,
+}
+
+/// Which file it is of all that ever had its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Which {
     device: u64,
     inode: u64,
 }
 
-impl Seen {
+impl Which {
     /// The file that is at `path` now.
-    fn at(path: PathBuf) -> Option<Self> {
-        let metadata = fs::symlink_metadata(&path).ok()?;
+    fn at(path: &Path) -> Option<Self> {
+        let metadata = fs::symlink_metadata(path).ok()?;
         Some(Self {
-            path,
             device: metadata.dev(),
             inode: metadata.ino(),
         })
     }
+}
 
-    /// Whether it is there: `None` if nothing is, false if another file is.
-    fn is_there(&self) -> Option<bool> {
-        let now = Self::at(self.path.clone())?;
-        Some(now == *self)
+impl Seen {
+    fn at(path: PathBuf) -> Self {
+        Self {
+            which: Which::at(&path),
+            path,
+        }
+    }
+
+    /// One that has gone, whatever there is in its place.
+    fn gone(path: PathBuf) -> Self {
+        Self { path, which: None }
+    }
+
+    fn is_there(&self) -> bool {
+        self.which.is_some() && self.which == Which::at(&self.path)
+    }
+
+    /// Whether another file is there.
+    fn is_replaced(&self) -> bool {
+        let now = Which::at(&self.path);
+        now.is_some() && now != self.which
     }
 }
 
@@ -66,7 +90,8 @@ impl Watched {
         let nodes = PathBuf::from(global.node_dir().to_string());
         let services = PathBuf::from(global.service_dir().to_string());
 
-        let mut files = vec![nodes.join(format!("{prefix}{own}{}", global.node.monitor_suffix))];
+        let monitor = nodes.join(format!("{prefix}{own}{}", global.node.monitor_suffix));
+        let mut files = vec![Seen::at(monitor)];
         let tag_suffix = global.node.service_tag_suffix.to_string();
         let mut used = Vec::new();
         for tag in names(&nodes.join(own.to_string()))? {
@@ -80,37 +105,50 @@ impl Watched {
                 "{service}{}",
                 global.service.static_config_storage_suffix
             ));
-            let text = fs::read_to_string(&description).ok();
-            used.extend(text.and_then(|text| service_id(&text)));
-            files.push(description);
+            let seen = Seen::at(description);
+            let text = fs::read_to_string(&seen.path).ok();
+            let described = text.and_then(|text| service_id(&text));
+            let id = node.opened(service).or(described);
+            used.extend(id);
+            // Between its opening and now others may have removed it, or made another of its name.
+            files.push(match id.is_some() && id == described {
+                true => seen,
+                false => Seen::gone(seen.path),
+            });
         }
         let data_suffix = global.service.data_segment_suffix.to_string();
         let shared_suffix = global.service.dynamic_config_storage_suffix.to_string();
-        let is_needed = |name: &String| {
+        let mut found = BTreeSet::new();
+        for name in names(Path::new(SHARED_MEMORY))? {
             let ids = name.strip_prefix(&prefix).map(ids).unwrap_or_default();
-            let [id] = ids[..] else { return false };
-            (with_data && name.ends_with(&data_suffix) && process_of(id) == std::process::id())
-                || (name.ends_with(&shared_suffix) && used.contains(&id))
-        };
-        let segments = names(Path::new(SHARED_MEMORY))?.into_iter();
-        files.extend(
-            segments
-                .filter(is_needed)
-                .map(|name| Path::new(SHARED_MEMORY).join(name)),
-        );
-        Ok(Self(files.into_iter().filter_map(Seen::at).collect()))
+            let [id] = ids[..] else { continue };
+            let is_own = name.ends_with(&data_suffix) && process_of(id) == std::process::id();
+            let is_shared = name.ends_with(&shared_suffix) && used.contains(&id);
+            if is_shared {
+                found.insert(id);
+            }
+            if is_shared || (with_data && is_own) {
+                files.push(Seen::at(Path::new(SHARED_MEMORY).join(name)));
+            }
+        }
+        let missing = used.into_iter().filter(|id| !found.contains(id));
+        files.extend(missing.map(|id| {
+            let name = format!("{prefix}{id}{shared_suffix}");
+            Seen::gone(Path::new(SHARED_MEMORY).join(name))
+        }));
+        Ok(Self(files))
     }
 
     /// Whether all of them are still there, and are the same. One system call for each.
     #[must_use]
     pub fn is_intact(&self) -> bool {
-        self.0.iter().all(|file| file.is_there() == Some(true))
+        self.0.iter().all(Seen::is_there)
     }
 
     /// Runs `let_go`, which ends the use of these files, and puts back what others have made of the same name since: the
     /// last user of a service removes its description by name.
     pub fn sparing_others<T>(&self, let_go: impl FnOnce() -> T) -> T {
-        let others = self.0.iter().filter(|file| file.is_there() == Some(false));
+        let others = self.0.iter().filter(|file| file.is_replaced());
         let aside: Vec<(&Path, PathBuf)> = others
             .filter_map(|file| {
                 let aside = aside(&file.path);

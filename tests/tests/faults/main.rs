@@ -43,7 +43,6 @@ short! {
     what_all_of_them_left_is_removed_by_the_next_daemon: "kill-all", 1;
     what_all_of_them_left_is_removed_by_doctor: "kill-all-doctor", 1;
     a_second_daemon_is_refused: "second-daemon", 3;
-    #[ignore = "the next daemon was not ready within a minute, cause unknown, docs/faults.md: cargo test -p inekf-tests --test faults -- --ignored"]
     a_daemon_killed_at_its_start_is_replaced: "early-daemon", 16;
     a_feeder_killed_at_its_start_is_replaced: "early-feeder", 10;
     a_reader_killed_at_its_start_is_replaced: "early-reader", 10;
@@ -59,7 +58,6 @@ short! {
     an_overloaded_smoother_goes_on: "smoother-overload", 1;
     too_little_shared_memory_is_said_at_the_start: "shm-full", 6;
     a_feeder_without_shared_memory_says_so: "shm-fills-up", 1;
-    #[ignore = "a feeder or reader did not attach anew within a minute, cause unknown, docs/faults.md: cargo test -p inekf-tests --test faults -- --ignored"]
     deleted_files_are_made_anew: "shm-deleted", 3;
     too_few_descriptors_are_said_at_the_start: "descriptors", 8;
     a_full_disk_stops_no_estimate: "disk-full", 1;

@@ -152,14 +152,32 @@ impl Disk {
     }
 }
 
-/// The scene with a checkpoint on the disk.
-fn scene_on(disk: &Disk) -> (Scene, String) {
-    let path = disk.path().join("car.checkpoint");
-    let config = format!(
-        "{CONFIG}[checkpoint]\npath = '{}'\nperiod_s = 0.02\n[journal]\npublish = true\n",
-        path.display()
-    );
-    (Scene::with_config(&config), config)
+/// A daemon whose checkpoint is on a disk.
+struct OnDisk {
+    disk: Disk,
+    scene: Scene,
+    daemon: Daemon,
+    health: HealthReader,
+}
+
+impl OnDisk {
+    fn start(means: Means) -> Self {
+        let disk = Disk::new(means);
+        let config = format!(
+            "{CONFIG}[checkpoint]\npath = '{}'\nperiod_s = 0.02\n[journal]\npublish = true\n",
+            disk.path().join("car.checkpoint").display()
+        );
+        let scene = Scene::with_config(&config);
+        let command = disk.command(&scene, &programs().service);
+        let daemon = Daemon::start_as(command, INSTANCE, &config);
+        let health = HealthReader::open(&scene.memory, INSTANCE);
+        Self {
+            disk,
+            scene,
+            daemon,
+            health,
+        }
+    }
 }
 
 /// Waits until checkpoints fail, again and again, and then until they succeed after `repair`; says how long that took.
@@ -201,11 +219,12 @@ pub fn full(plan: &Plan) -> Outcome {
     let rounds = plan.at_most(30);
     let (mut times, mut after) = (Vec::new(), 0);
     for _ in 0..rounds {
-        let disk = Disk::new(means);
-        let (scene, config) = scene_on(&disk);
-        let command = disk.command(&scene, &programs().service);
-        let daemon = Daemon::start_as(command, INSTANCE, &config);
-        let health = HealthReader::open(&scene.memory, INSTANCE);
+        let OnDisk {
+            disk,
+            scene,
+            daemon,
+            health,
+        } = OnDisk::start(means);
         let recording = disk.path().join("flight.rec");
         let mut command = disk.command(&scene, &programs().client);
         command.args(["record", "--instance", INSTANCE, "--out"]);
@@ -291,11 +310,12 @@ pub fn read_only(plan: &Plan) -> Outcome {
     let rounds = plan.at_most(30);
     let (mut times, mut after) = (Vec::new(), 0);
     for _ in 0..rounds {
-        let disk = Disk::new(means);
-        let (scene, config) = scene_on(&disk);
-        let command = disk.command(&scene, &programs().service);
-        let daemon = Daemon::start_as(command, INSTANCE, &config);
-        let health = HealthReader::open(&scene.memory, INSTANCE);
+        let OnDisk {
+            disk,
+            scene,
+            daemon,
+            health,
+        } = OnDisk::start(means);
         let feeder = scene.feeder(plan, RATE_HZ);
         let mut observer = scene.observer();
         let last = observer.wait();

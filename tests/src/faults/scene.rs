@@ -14,6 +14,7 @@ use super::Plan;
 use crate::link::instance;
 use crate::memory::Memory;
 use crate::process::{Daemon, PATIENCE, Running, service};
+use crate::programs::programs;
 
 /// The instance of all scenes.
 pub const INSTANCE: &str = "car";
@@ -54,6 +55,8 @@ impl Scene {
 
     /// A scene with another configuration.
     pub fn with_config(config: &str) -> Self {
+        // They may have to be built first, which no time is to contain.
+        programs();
         Self {
             memory: Memory::new(),
             config: config.to_owned(),

@@ -106,52 +106,20 @@ fn less<const D: usize>(p: &Covariance<D>, lost: &SMatrix<f64, D, D>) -> (Covari
     (remaining, share)
 }
 
-/// A side on which a correction is carried on in time.
+/// A side on which a correction is carried on in time: in coordinates of the left-invariant error, unless it has better
+/// ones.
 pub trait LateSide: Side {
     /// What the covariance lost from `before` to `after` a measurement, in coordinates around the mean before.
-    fn lost<G: LieGroup<D>, const D: usize>(
-        before: &Belief<G, Self, D>,
-        after: &Belief<G, Self, D>,
-    ) -> SMatrix<f64, D, D>;
-
-    /// What is left of the covariance of `now` of such a loss, in coordinates around its mean, after `drift` and the
-    /// motion `body`, and the least share of a variance that this is.
-    fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
-        lost: &SMatrix<f64, D, D>,
-        drift: &Drift<G, A, D>,
-        body: &G,
-        now: &Belief<G, Self, D>,
-    ) -> (Covariance<D>, f64);
-
-    /// The belief at `mean` whose covariance is `remaining` in coordinates around the mean of `now`.
-    fn recentred<G: LieGroup<D>, const D: usize>(
-        remaining: &Covariance<D>,
-        now: &Belief<G, Self, D>,
-        mean: G,
-    ) -> Belief<G, Self, D>;
-}
-
-/// `F lost F^T` of the left-invariant error.
-fn left_loss<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
-    lost: &SMatrix<f64, D, D>,
-    drift: &Drift<G, A, D>,
-    body: &G,
-) -> SMatrix<f64, D, D> {
-    let mut lost = *lost;
-    drift.automorphism.congruence(&mut lost);
-    G::congruence(&mut lost, &body.inverse().adjoint());
-    lost
-}
-
-impl LateSide for Left {
     #[inline]
     fn lost<G: LieGroup<D>, const D: usize>(
         before: &Belief<G, Self, D>,
         after: &Belief<G, Self, D>,
     ) -> SMatrix<f64, D, D> {
-        before.covariance.matrix() - after.covariance.matrix()
+        before.left_covariance().matrix() - after.left_covariance().matrix()
     }
 
+    /// What is left of the covariance of `now` of such a loss, in coordinates around its mean, after `drift` and the
+    /// motion `body`, and the least share of a variance that this is.
     #[inline]
     fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
         lost: &SMatrix<f64, D, D>,
@@ -159,18 +127,26 @@ impl LateSide for Left {
         body: &G,
         now: &Belief<G, Self, D>,
     ) -> (Covariance<D>, f64) {
-        less(&now.covariance, &left_loss(lost, drift, body))
+        let mut lost = *lost;
+        drift.automorphism.congruence(&mut lost);
+        G::congruence(&mut lost, &body.inverse().adjoint());
+        now.with_left_covariance(|whole| less(whole, &lost))
     }
 
+    /// The belief at `mean` whose covariance is `remaining` in coordinates around the mean of `now`.
     #[inline]
     fn recentred<G: LieGroup<D>, const D: usize>(
         remaining: &Covariance<D>,
         _now: &Belief<G, Self, D>,
         mean: G,
     ) -> Belief<G, Self, D> {
-        Belief::new(mean, *remaining)
+        Belief::from_left_covariance(mean, *remaining)
     }
 }
+
+impl LateSide for Left {}
+
+impl LateSide for Additive {}
 
 impl LateSide for Right {
     fn lost<G: LieGroup<D>, const D: usize>(
@@ -202,31 +178,5 @@ impl LateSide for Right {
         let mut covariance = *remaining;
         covariance.transform_by::<G>(&mean.compose(&now.mean.inverse()).adjoint());
         Belief::new(mean, covariance)
-    }
-}
-
-impl LateSide for Additive {
-    fn lost<G: LieGroup<D>, const D: usize>(
-        before: &Belief<G, Self, D>,
-        after: &Belief<G, Self, D>,
-    ) -> SMatrix<f64, D, D> {
-        before.left_covariance().matrix() - after.left_covariance().matrix()
-    }
-
-    fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
-        lost: &SMatrix<f64, D, D>,
-        drift: &Drift<G, A, D>,
-        body: &G,
-        now: &Belief<G, Self, D>,
-    ) -> (Covariance<D>, f64) {
-        less(&now.left_covariance(), &left_loss(lost, drift, body))
-    }
-
-    fn recentred<G: LieGroup<D>, const D: usize>(
-        remaining: &Covariance<D>,
-        _now: &Belief<G, Self, D>,
-        mean: G,
-    ) -> Belief<G, Self, D> {
-        Belief::from_left_covariance(mean, *remaining)
     }
 }

@@ -208,6 +208,24 @@ fn a_service_that_was_left_half_made_is_made_anew_beside_those_who_have_it_open(
     }
 }
 
+#[test]
+fn what_a_killed_process_left_half_made_is_swept() {
+    for bytes in [0, 4096] {
+        let memory = Isolated::new();
+        let mut child = start_child(&memory);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let files = memory.shared_memory_files();
+        let dynamic = files.iter().find(|name| name.ends_with(".dynamic"));
+        leave_half_made(dynamic.unwrap_or_else(|| panic!("{files:?}")), bytes);
+        let config = memory.config.clone();
+        within_a_while("a node", move || {
+            drop(transport::open_node_with("next", &config).unwrap());
+        });
+        memory.assert_no_file_is_left();
+    }
+}
+
 /// Others may remove or replace what a process has just opened before it first looks.
 #[test]
 fn what_went_before_it_was_first_looked_at_counts_as_gone() {

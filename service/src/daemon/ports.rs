@@ -175,7 +175,7 @@ impl<M: Model> Ports<M> {
         };
         Ok(Self {
             inputs: Inputs {
-                samples: transport::input::<M::Sample>(&node, instance)?.subscriber()?,
+                samples: M::Sample::topic_of(&inputs).subscriber()?,
                 position: FixPort::new(inputs.position.subscriber()?, uses_position),
                 velocity: FixPort::new(inputs.velocity.subscriber()?, uses_velocity),
                 heading: FixPort::new(inputs.heading.subscriber()?, uses_heading),

@@ -122,7 +122,7 @@ fn is_half_removed(config: &Config, id: u128) -> bool {
 ///
 /// # Errors
 /// As [`nodes`].
-pub fn remove_dead_nodes(config: &Config) -> Result<(usize, usize), TransportError> {
+pub(super) fn remove_dead_nodes(config: &Config) -> Result<(usize, usize), TransportError> {
     let (mut removed, mut kept) = (0, 0);
     each_node(config, |state| {
         if let NodeState::Dead(view) = state {

@@ -196,6 +196,8 @@ pub fn open_another_node(name: &str) -> Result<Node, TransportError> {
 pub fn open_node_with(name: &str, config: &Config) -> Result<Node, TransportError> {
     require_descriptors()?;
     require_shared_memory(LEAST_FREE)?;
+    // One for both.
+    let _warden = Warden::of(config);
     // What could not be swept need not stand in the way; if it does, whatever it blocks says so.
     let _ = sweep(config);
     create(name, config)

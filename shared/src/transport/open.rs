@@ -2,6 +2,9 @@
 //!
 //! All but the newest estimate are opened or created by whoever comes first, so daemon and clients start in any
 //! order. The newest estimate is created by the daemon alone.
+//!
+//! Open no service twice on one node: if somebody removes its description in between, iceoryx2 0.10 creates it anew, finds
+//! it registered already, and panics.
 
 use iceoryx2::prelude::{MessagingPattern, Service, ServiceName, ipc};
 use iceoryx2::service::builder::blackboard::{BlackboardCreateError, BlackboardOpenError};
@@ -27,27 +30,34 @@ pub trait InputMessage: Message {
 
     /// When it was measured, and which one it is.
     fn header(&self) -> &Header;
+
+    /// Its topic among all inputs.
+    fn topic_of(inputs: &Inputs) -> &PubSub<Self>;
 }
 
 macro_rules! input_message {
-    ($($message:ty => $topic:ident),+ $(,)?) => {
+    ($($message:ty => $topic:ident, $field:ident;)+) => {
         $(impl InputMessage for $message {
             const TOPIC: Topic = Topic::$topic;
 
             fn header(&self) -> &Header {
                 &self.header
             }
+
+            fn topic_of(inputs: &Inputs) -> &PubSub<Self> {
+                &inputs.$field
+            }
         })+
     };
 }
 
 input_message! {
-    ImuSample => Imu,
-    Odometry2d => Odometry2d,
-    Odometry3d => Odometry3d,
-    PositionFix => Position,
-    VelocityFix => Velocity,
-    HeadingFix => Heading,
+    ImuSample => Imu, imu;
+    Odometry2d => Odometry2d, odometry2d;
+    Odometry3d => Odometry3d, odometry3d;
+    PositionFix => Position, position;
+    VelocityFix => Velocity, velocity;
+    HeadingFix => Heading, heading;
 }
 
 /// All inputs of an instance.

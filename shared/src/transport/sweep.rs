@@ -21,7 +21,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime};
 
 use super::inspect::{self, SHARED_MEMORY};
-use super::stillborn::is_complete;
+use super::stillborn::{Warden, is_complete};
 use super::{Config, TransportError};
 
 /// A node or a service is made within milliseconds: a half-made one that is older was left by a process that died.
@@ -53,6 +53,8 @@ pub struct Swept {
 /// # Errors
 /// [`TransportError::Internal`] if nodes or folders cannot be listed.
 pub fn sweep(config: &Config) -> Result<Swept, TransportError> {
+    // Cleaning up after a node opens what it had open, and may meet what was never finished.
+    let _warden = Warden::of(config);
     let Some(_lock) = lock(&root(config)) else {
         return Ok(Swept::default());
     };

@@ -476,7 +476,6 @@ fn the_commands_for_contributors_are_those_of_ci_or_are_listed() {
         ("cargo bench", "measures"),
         ("cargo test --release", "measures"),
         ("cargo test -p", "part of the whole"),
-        ("cargo deny check", "wants cargo-deny and the network"),
     ];
     let ci = read(&project().join(".ci/run"));
     let text = page("CONTRIBUTING.md").text;

@@ -3,6 +3,8 @@
 
 #[path = "process/checkpoint.rs"]
 mod checkpoint;
+#[path = "process/fleet.rs"]
+mod fleet;
 
 use std::time::{Duration, Instant};
 

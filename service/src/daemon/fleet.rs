@@ -12,11 +12,12 @@ use anyhow::Context;
 use inekf_shared::clock::monotonic_ns;
 use inekf_shared::message::EstimateMessage;
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, Node, TransportError};
+use inekf_shared::transport::{self, Node, TransportError, Watched};
 
+use super::group::{Group, NODE};
 use super::ports::Ports;
 use super::realtime;
-use super::run::{Ended, Work, run};
+use super::run::{Ended, Work};
 use super::vehicle::{Terms, Vehicle};
 use crate::checkpoint::file::Identity;
 use crate::checkpoint::{self, Keeper};
@@ -127,48 +128,43 @@ fn thread<'a>(
     ready: impl FnOnce() -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
     let instances: Vec<&Instance> = instances.collect();
-    let mut vehicles = open_all(order, &instances, open_node)?;
-    realtime::apply(&order.config.runtime, index);
-    ready()?;
-    let mut outcome = run(&mut vehicles, &order.config.runtime, order.stop);
-    while let Ok(Ended::FilesGone(index)) = outcome {
-        tracing::warn!(
-            instance = %instances[index],
-            "files of this instance in shared memory were removed while it ran; opening them anew. Feeders and \
-             readers of this project's library attach again by themselves"
-        );
-        let Some(reopened) = vehicles.remove(index).reopen(instances[index], order.stop) else {
-            outcome = Ok(Ended::Stopped);
-            break;
-        };
-        vehicles.insert(index, reopened);
-        tracing::info!(instance = %instances[index], "the ports are open again");
-        outcome = run(&mut vehicles, &order.config.runtime, order.stop);
-    }
-    let mut outcome = outcome.map(|_| ());
-    for vehicle in vehicles {
-        outcome = outcome.and(vehicle.finish());
-    }
-    outcome
-}
-
-/// Opens the vehicles of one thread on one node: a node of its own for each would have to look at those of all others.
-fn open_all<'a>(
-    order: &Order<'a>,
-    instances: &[&Instance],
-    open_node: OpenNode,
-) -> anyhow::Result<Vec<Box<dyn Work<'a> + 'a>>> {
-    let node = Rc::new(open_node("inekf-service")?);
-    let open = |instance: &&Instance| {
-        let node = Rc::clone(&node);
+    // Files of the process can be told to be this thread's only if there is no other.
+    let watch = match instances.len() == order.instances.len() {
+        true => Watched::of,
+        false => Watched::services_of,
+    };
+    let mut group = Group::open(open_node(NODE)?, &instances, watch, |node, instance| {
         let open = Open {
             node,
             order,
             instance,
         };
         engine::build(order.config, open)?
+    })?;
+    realtime::apply(&order.config.runtime, index);
+    ready()?;
+    let outcome = loop {
+        match group.run(&order.config.runtime, order.stop) {
+            Ok(Ended::FilesGone) => {}
+            ended => break ended.map(drop),
+        }
+        let which = match instances[..] {
+            [instance] => instance.to_string(),
+            _ => format!("{} of them", instances.len()),
+        };
+        tracing::warn!(
+            instance = which,
+            "files in shared memory were removed while they were in use; opening them anew. Feeders and readers of \
+             this project's library attach again by themselves"
+        );
+        match group.reopened(&instances, watch, order.stop) {
+            Some(again) => group = again,
+            None => return Ok(()),
+        }
+        tracing::info!(instance = which, "the ports are open again");
     };
-    instances.iter().map(open).collect()
+    let finished = group.finish();
+    outcome.and(finished)
 }
 
 struct Open<'o, 'a> {
@@ -191,9 +187,6 @@ impl<'a> Use for Open<'_, 'a> {
             ..
         } = *self.order;
         let mut ports = Ports::open_on(self.node, self.instance, config, stepped)?;
-        if self.order.instances.len() == 1 {
-            ports.watch_files()?;
-        }
         let mut terms = Terms {
             config,
             config_text,

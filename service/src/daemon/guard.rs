@@ -13,8 +13,7 @@ use tracing::warn;
 const PERIOD: Duration = Duration::from_millis(250);
 
 /// Whether somebody has removed files of the ports while they are in use. Ends its thread when dropped.
-/// The default looks after nothing.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Guard {
     watched: Arc<Watched>,
     gone: Arc<AtomicBool>,

@@ -11,11 +11,10 @@ use inekf_shared::message::{
 use inekf_shared::topic::Instance;
 use inekf_shared::transport::{
     self, ControlServer, InputMessage, LatestWriter, Node, Outlet, PubSub, Publisher, Subscriber,
-    TransportError, WakeListener, Watched,
+    TransportError, WakeListener,
 };
 
 use super::fix_port::FixPort;
-use super::guard::Guard;
 use super::journal::JournalPort;
 use super::smoothed::SmoothedPort;
 use crate::config::{Config, Motion, WaitMode};
@@ -129,9 +128,8 @@ pub struct Ports<M: Model> {
     pub control: ControlServer,
     /// Woken by feeders in event mode; without a listener their notifications cost nothing.
     pub wake: Option<WakeListener>,
-    guard: Guard,
-    // Kept until the ports are gone; a fleet's vehicles share one.
-    node: Rc<Node>,
+    // Kept until the ports are gone; the vehicles of a thread share one.
+    _node: Rc<Node>,
 }
 
 impl<M: Model> Ports<M> {
@@ -191,29 +189,7 @@ impl<M: Model> Ports<M> {
             health: transport::health(&node, instance)?.publisher()?,
             control,
             wake,
-            guard: Guard::default(),
-            node,
+            _node: node,
         })
-    }
-
-    /// Has an eye on the files from now on: call it once nothing is open any more that is closed again, and if this is
-    /// the only vehicle of its process: those of several cannot be told apart.
-    ///
-    /// # Errors
-    /// [`TransportError::Internal`] if the folders cannot be read.
-    pub fn watch_files(&mut self) -> Result<(), TransportError> {
-        self.guard = Guard::of(Watched::of(&self.node)?);
-        Ok(())
-    }
-
-    /// Lets go of them, and of nothing that others have made in their place since.
-    pub fn let_go(mut self) {
-        let watched = core::mem::take(&mut self.guard).end();
-        watched.sparing_others(|| drop(self));
-    }
-
-    /// Whether somebody has removed files that others need in order to attach.
-    pub fn have_lost_files(&self) -> bool {
-        self.guard.has_lost()
     }
 }

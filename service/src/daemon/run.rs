@@ -3,8 +3,12 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 
-use inekf_shared::topic::Instance;
+use std::rc::Rc;
 
+use inekf_shared::topic::Instance;
+use inekf_shared::transport::Node;
+
+use super::guard::Guard;
 use crate::config::{Runtime, WaitMode};
 
 /// What came of one look at a vehicle.
@@ -14,8 +18,6 @@ pub enum Turn {
     Idle,
     /// There was a sample.
     Busy,
-    /// Files of its ports were removed: the ports have to be opened anew.
-    FilesGone,
 }
 
 /// Why a loop ended.
@@ -23,8 +25,8 @@ pub enum Turn {
 pub enum Ended {
     /// It was asked to stop.
     Stopped,
-    /// The ports of the vehicle with this index have to be opened anew.
-    FilesGone(usize),
+    /// Files of the ports were removed: all have to be opened anew.
+    FilesGone,
 }
 
 /// One vehicle's work, as a loop sees it.
@@ -47,12 +49,8 @@ pub trait Work<'a> {
     /// Waiting is not possible.
     fn sleep(&mut self, bound: Duration) -> anyhow::Result<()>;
 
-    /// Opens its ports anew, on another node: tries until it can, or until `stop` is set; then there is none.
-    fn reopen(
-        self: Box<Self>,
-        instance: &Instance,
-        stop: &AtomicBool,
-    ) -> Option<Box<dyn Work<'a> + 'a>>;
+    /// Lets go of its ports, and keeps its state.
+    fn close(self: Box<Self>) -> Box<dyn Closed<'a> + 'a>;
 
     /// Accounts for what has come and will not be used, says so, and keeps what the next start needs.
     ///
@@ -60,6 +58,25 @@ pub trait Work<'a> {
     /// As [`Work::turn`].
     fn finish(self: Box<Self>) -> anyhow::Result<()>;
 }
+
+/// A vehicle without ports.
+pub trait Closed<'a> {
+    /// Opens its ports on this node.
+    ///
+    /// # Errors
+    /// They cannot be opened; the vehicle comes back with the reason.
+    fn open(
+        self: Box<Self>,
+        node: Rc<Node>,
+        instance: &Instance,
+    ) -> Result<Box<dyn Work<'a> + 'a>, StillClosed<'a>>;
+
+    /// Keeps what the next start needs.
+    fn finish(self: Box<Self>);
+}
+
+/// A vehicle whose ports could not be opened, and why.
+pub type StillClosed<'a> = (Box<dyn Closed<'a> + 'a>, anyhow::Error);
 
 /// Works until `stop` is set, or ports have to be opened anew. Asleep between samples there can be one vehicle only: it
 /// is a loop's only reason to wake.
@@ -69,26 +86,30 @@ pub trait Work<'a> {
 pub fn run<'a, W: Work<'a> + ?Sized>(
     vehicles: &mut [Box<W>],
     runtime: &Runtime,
+    guard: &Guard,
     stop: &AtomicBool,
 ) -> anyhow::Result<Ended> {
     match (runtime.wait, vehicles) {
         (WaitMode::Event, [vehicle]) => {
             let bound = runtime.event_timeout();
             while !stop.load(Ordering::Relaxed) {
+                if guard.has_lost() {
+                    return Ok(Ended::FilesGone);
+                }
                 match vehicle.round()? {
                     Turn::Busy => {}
                     // Every sleep is followed by a look at all inputs, so a lost wake-up costs at most the bound.
                     Turn::Idle => vehicle.sleep(bound)?,
-                    Turn::FilesGone => return Ok(Ended::FilesGone(0)),
                 }
             }
         }
         (_, vehicles) => {
             while !stop.load(Ordering::Relaxed) {
-                for (index, vehicle) in vehicles.iter_mut().enumerate() {
-                    if vehicle.turn()? == Turn::FilesGone {
-                        return Ok(Ended::FilesGone(index));
-                    }
+                if guard.has_lost() {
+                    return Ok(Ended::FilesGone);
+                }
+                for vehicle in vehicles.iter_mut() {
+                    vehicle.turn()?;
                 }
                 core::hint::spin_loop();
             }

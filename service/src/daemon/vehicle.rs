@@ -6,7 +6,6 @@
 //! sent before it), checkpoint, health. A loop that spins does one chore between some looks at the
 //! samples, so that none of them finds it busy with more than that.
 
-use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::rc::Rc;
 
@@ -17,13 +16,12 @@ use inekf_shared::message::{
     INPUT_POSITION, INPUT_VELOCITY, Message, REASON_WRONG_MODEL,
 };
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, InputMessage};
-use tracing::warn;
+use inekf_shared::transport::{InputMessage, Node};
 
 use super::control::{answer, take};
 use super::journal::JournalPort;
 use super::ports::{Ports, Refuser};
-use super::run::{Turn, Work};
+use super::run::{Closed, StillClosed, Turn, Work};
 use super::watch::{Moment, Watch};
 use crate::checkpoint::Keeper;
 use crate::config::Config;
@@ -34,8 +32,6 @@ use crate::engine::{Engine, History, Model};
 /// Looks at the samples of a loop that spins between two chores: a sample rarely finds it at one, and every chore has
 /// its turn within microseconds.
 const LOOKS_PER_CHORE: usize = 4;
-/// Between two tries to open ports anew.
-const BETWEEN_TRIES: Duration = Duration::from_millis(100);
 
 /// What a vehicle is told once.
 #[derive(Clone, Copy, Debug)]
@@ -59,6 +55,39 @@ pub struct Vehicle<'a, M: Model, H> {
     watch: Watch,
     /// Looks so far: whose turn it is.
     turns: usize,
+}
+
+/// An engine without ports.
+struct ClosedVehicle<'a, M: Model, H> {
+    engine: Engine<M, H>,
+    terms: Terms<'a>,
+    keeper: Option<Keeper>,
+}
+
+impl<'a, M: Model + 'static, H: History<M> + 'static> Closed<'a> for ClosedVehicle<'a, M, H> {
+    fn open(
+        self: Box<Self>,
+        node: Rc<Node>,
+        instance: &Instance,
+    ) -> Result<Box<dyn Work<'a> + 'a>, StillClosed<'a>> {
+        match Ports::open_on(node, instance, self.terms.config, self.terms.stepped) {
+            Ok(ports) => {
+                let Self {
+                    engine,
+                    terms,
+                    keeper,
+                } = *self;
+                Ok(Box::new(Vehicle::new(engine, ports, terms, keeper)))
+            }
+            Err(error) => Err((self, error.into())),
+        }
+    }
+
+    fn finish(self: Box<Self>) {
+        if let Some(keeper) = self.keeper {
+            keeper.finish(self.engine.snapshot());
+        }
+    }
 }
 
 /// A watch that begins now.
@@ -296,14 +325,6 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
         Ok(())
     }
 
-    fn after(&self, any_sample: bool) -> Turn {
-        match (self.ports.have_lost_files(), any_sample) {
-            (true, _) => Turn::FilesGone,
-            (false, true) => Turn::Busy,
-            (false, false) => Turn::Idle,
-        }
-    }
-
     fn look_at_clock(&mut self) {
         let now_ns = monotonic_ns();
         if let Some(keeper) = &mut self.keeper {
@@ -348,15 +369,6 @@ impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
     }
 }
 
-/// The ports of a vehicle on a node of their own, whose opening sweeps what is left of the old ones.
-fn open_anew<M: Model>(instance: &Instance, terms: &Terms<'_>) -> anyhow::Result<Ports<M>> {
-    let node = Rc::new(transport::open_node("inekf-service")?);
-    let mut ports = Ports::open_on(Rc::clone(&node), instance, terms.config, terms.stepped)?;
-    transport::reserve_shared_memory(node.config())?;
-    ports.watch_files()?;
-    Ok(ports)
-}
-
 impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M, H> {
     fn turn(&mut self) -> anyhow::Result<Turn> {
         let any = !self.terms.stepped && self.take_samples()?;
@@ -364,7 +376,7 @@ impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M
         if self.turns.is_multiple_of(LOOKS_PER_CHORE) {
             self.attend(CHORES[self.turns / LOOKS_PER_CHORE])?;
         }
-        Ok(self.after(any))
+        Ok(if any { Turn::Busy } else { Turn::Idle })
     }
 
     fn round(&mut self) -> anyhow::Result<Turn> {
@@ -372,7 +384,7 @@ impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M
         for chore in CHORES {
             self.attend(chore)?;
         }
-        Ok(self.after(any))
+        Ok(if any { Turn::Busy } else { Turn::Idle })
     }
 
     fn sleep(&mut self, bound: Duration) -> anyhow::Result<()> {
@@ -383,39 +395,18 @@ impl<'a, M: Model + 'static, H: History<M> + 'static> Work<'a> for Vehicle<'a, M
         Ok(())
     }
 
-    fn reopen(
-        self: Box<Self>,
-        instance: &Instance,
-        stop: &AtomicBool,
-    ) -> Option<Box<dyn Work<'a> + 'a>> {
+    fn close(self: Box<Self>) -> Box<dyn Closed<'a> + 'a> {
         let Self {
             engine,
-            ports,
             terms,
             keeper,
             ..
         } = *self;
-        // Their places first, or the new ones would take them for another daemon's.
-        ports.let_go();
-        let mut is_said = false;
-        loop {
-            match open_anew(instance, &terms) {
-                Ok(ports) => return Some(Box::new(Self::new(engine, ports, terms, keeper))),
-                Err(error) if !core::mem::replace(&mut is_said, true) => {
-                    warn!(
-                        "not yet, and tried again: do feeders or readers hold the removed files? {error:#}"
-                    );
-                }
-                Err(_) => {}
-            }
-            if stop.load(Ordering::Relaxed) {
-                if let Some(keeper) = keeper {
-                    keeper.finish(engine.snapshot());
-                }
-                return None;
-            }
-            std::thread::sleep(BETWEEN_TRIES);
-        }
+        Box::new(ClosedVehicle {
+            engine,
+            terms,
+            keeper,
+        })
     }
 
     fn finish(mut self: Box<Self>) -> anyhow::Result<()> {

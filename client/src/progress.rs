@@ -8,21 +8,6 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 const STRIDE: usize = 256;
 
 /// A bar over a known number of steps; silent where standard error is not a terminal.
-///
-/// ```
-/// use inekf_client::progress::Progress;
-///
-/// // Silent where standard error is no terminal, so that logs stay clean.
-/// let rows = [1, 2, 3];
-/// let progress = Progress::new("summing", rows.len());
-/// let mut sum = 0;
-/// for (done, row) in rows.into_iter().enumerate() {
-///     sum += row;
-///     progress.advance(done);
-/// }
-/// progress.finish();
-/// assert_eq!(sum, 6);
-/// ```
 #[derive(Debug)]
 pub struct Progress {
     bar: ProgressBar,

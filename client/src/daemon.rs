@@ -80,7 +80,7 @@ impl Daemon {
     ///
     /// use inekf_client::daemon::Daemon;
     ///
-    /// let daemon = Daemon::start_fleet(Path::new("car.toml"), "car-[1..100]")?;
+    /// let daemon = Daemon::start_fleet(Path::new("car.toml"), "car-{1..100}")?;
     /// println!("{}", daemon.ready_line());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```

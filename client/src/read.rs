@@ -145,6 +145,23 @@ impl<E: EstimateMessage> EstimateReader<E> {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
+    ///
+    /// A node under a configuration of one's own keeps a test apart from all else:
+    ///
+    /// ```
+    /// use inekf_client::read::EstimateReader;
+    /// use inekf_shared::message::EstimateSe23;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// let config = transport::config(root.path().to_str(), prefix)?;
+    /// let node = transport::open_node_with("my-test", &config)?;
+    /// let mut reader = EstimateReader::<EstimateSe23>::open_on(node, &Instance::new("car")?)?;
+    /// assert!(reader.next_estimate()?.is_none() && reader.missed() == 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
         let open = |node: &Node, instance: &Instance| {
             transport::estimate::<E>(node, instance)?.subscriber()

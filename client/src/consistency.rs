@@ -14,6 +14,16 @@ use crate::table::estimate::triangle_len;
 use crate::table::{EstimateRow, EstimateState, Layout};
 
 /// The NEES at one stamp.
+///
+/// ```
+/// use inekf_client::consistency::{NeesSample, band_95, degrees};
+/// use inekf_client::table::Layout;
+///
+/// // A run whose pose errors are as large as its covariance says has most of these in the band.
+/// let sample = NeesSample { stamp_ns: 1_000_000, nees: 5.3 };
+/// let (low, high) = band_95(degrees(Layout::Pose));
+/// assert!(low < sample.nees && sample.nees < high);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeesSample {
     /// Stamp, ns.
@@ -23,6 +33,15 @@ pub struct NeesSample {
 }
 
 /// Degrees of freedom of the NEES of a model.
+///
+/// ```
+/// use inekf_client::consistency::degrees;
+/// use inekf_client::table::Layout;
+///
+/// // Biases are left out: a recording's truth does not know them.
+/// assert_eq!(degrees(Layout::Navigation), 9);
+/// assert_eq!(degrees(Layout::Plane), 3);
+/// ```
 #[must_use]
 pub fn degrees(layout: Layout) -> usize {
     match layout {
@@ -34,6 +53,20 @@ pub fn degrees(layout: Layout) -> usize {
 
 /// The error of an estimate against the truth of the same time, in the order of its covariance, without biases. A
 /// velocity that the truth does not know is taken to be right.
+///
+/// ```
+/// use inekf_client::consistency::invariant_error;
+/// use inekf_client::evaluate::{Pose, estimate_pose};
+/// use inekf_client::table::{EstimateRow, EstimateState};
+///
+/// // A vehicle that faces north (y) and is a metre further on than estimated: a metre along its own x.
+/// let north = EstimateState::Plane { theta_rad: 90_f64.to_radians(), p_w_m: [0.0, 4.0] };
+/// let row = EstimateRow { stamp_ns: 0, state: north, covariance: vec![] };
+/// let mut truth: Pose = estimate_pose(0, &north);
+/// truth.p_w_m.y += 1.0;
+/// let xi = invariant_error(&row, &truth);
+/// assert!((xi[1] - 1.0).abs() < 1e-12 && xi[0].abs() < 1e-12 && xi[2].abs() < 1e-12);
+/// ```
 #[must_use]
 pub fn invariant_error(row: &EstimateRow, truth: &Pose) -> Vec<f64> {
     let estimate = estimate_pose(row.stamp_ns, &row.state);
@@ -70,6 +103,23 @@ fn planar_jacobian_inverse(turn_rad: f64) -> Matrix2<f64> {
 
 /// The NEES of every row with a covariance at whose stamp the truth is known; `max_gap_ns` as in
 /// [`errors`](crate::evaluate::errors).
+///
+/// ```
+/// use inekf_client::consistency::nees_series;
+/// use inekf_client::evaluate::{DEFAULT_MAX_GAP_NS, Trajectory, estimate_pose};
+/// use inekf_client::table::{EstimateRow, EstimateState};
+///
+/// // Two standard deviations (of 0.5 m) too far west: 2^2.
+/// let state = |x_m: f64| EstimateState::Plane { theta_rad: 0.0, p_w_m: [x_m, 0.0] };
+/// let row = EstimateRow {
+///     stamp_ns: 7,
+///     state: state(-1.0),
+///     covariance: vec![1.0, 0.0, 0.0, 0.25, 0.0, 1.0],
+/// };
+/// let truth = Trajectory::new_planar(vec![estimate_pose(7, &state(0.0))]);
+/// let series = nees_series(&[row], &truth, DEFAULT_MAX_GAP_NS);
+/// assert!((series[0].nees - 4.0).abs() < 1e-12);
+/// ```
 #[must_use]
 pub fn nees_series(rows: &[EstimateRow], truth: &Trajectory, max_gap_ns: u64) -> Vec<NeesSample> {
     let sample = |row: &EstimateRow| {

@@ -14,6 +14,13 @@ use inekf_shared::transport::{self, ControlClient, Node, TransportError, WakeNot
 use crate::attach::Attached;
 
 /// A request was not granted.
+///
+/// ```
+/// use inekf_client::control::ControlError;
+///
+/// let refused = ControlError::Refused { request: "smoothed", reason: "no smoother".to_owned() };
+/// assert_eq!(refused.to_string(), "the daemon refused the request `smoothed`: no smoother");
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum ControlError {
     /// The daemon said no.
@@ -62,6 +69,50 @@ const MAX_CONFIG_LEN: usize = 1 << 20;
 /// let mut daemon = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
 /// println!("at {:?}", daemon.snapshot()?.p_w_m);
 /// daemon.reset()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_client::control::Controller;
+/// use inekf_shared::message::{CONTROL_PAUSE, CONTROL_REFUSED, ControlResponse};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = || transport::open_node_with("doc", &config);
+/// let instance = Instance::new("car")?;
+/// let (ready, is_ready) = std::sync::mpsc::channel();
+/// std::thread::scope(|scope| -> Result<(), Box<dyn std::error::Error>> {
+///     // What a daemon does, twice:
+///     scope.spawn(|| -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+///         let node = node()?;
+///         let server = transport::control(&node, &instance)?.server()?;
+///         ready.send(())?;
+///         loop {
+///             let Some(request) = server.receive()? else { continue };
+///             let mut answer = ControlResponse { request_id: request.request_id, ..Default::default() };
+///             if request.kind == CONTROL_PAUSE {
+///                 answer.status = CONTROL_REFUSED;
+///                 answer.set_reason("it is busy");
+///             }
+///             request.send_copy(answer)?;
+///             if request.kind == CONTROL_PAUSE {
+///                 return Ok(());
+///             }
+///         }
+///     });
+///     is_ready.recv()?;
+///     let mut controller = Controller::open_on(node()?, &instance, Duration::from_secs(20))?;
+///     assert_eq!(controller.barrier()?.counters.lost, 0);
+///     // A refused request says why.
+///     let refused = controller.pause().expect_err("refused");
+///     assert!(refused.to_string().ends_with("it is busy"));
+///     Ok(())
+/// })?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Controller {
@@ -114,6 +165,21 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`].
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use std::time::Duration;
+    /// # use inekf_client::control::Controller;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut controller = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
+    /// use inekf_shared::message::STATE_RUNNING;
+    ///
+    /// let answer = controller.reset()?;
+    /// // It begins anew: what it waits for now is in the answer.
+    /// assert_ne!(answer.state_code, STATE_RUNNING);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn reset(&mut self) -> Result<ControlResponse, ControlError> {
         self.request(CONTROL_RESET, StateVector::ZERO)
     }
@@ -122,6 +188,26 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`].
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use std::time::Duration;
+    /// # use inekf_client::control::Controller;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut controller = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
+    /// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+    ///
+    /// controller.set_state(StateVector {
+    ///     model: MODEL_IMU,
+    ///     dimension: 0, // the covariance of the configuration
+    ///     q_wb: [0.0, 0.0, 0.0, 1.0],
+    ///     p_w_m: [12.0, 7.0, 0.0],
+    ///     ..StateVector::ZERO
+    /// })?;
+    /// assert_eq!(controller.snapshot()?.p_w_m, [12.0, 7.0, 0.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_state(&mut self, state: StateVector) -> Result<ControlResponse, ControlError> {
         self.request(CONTROL_SET_STATE, state)
     }
@@ -130,6 +216,19 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`].
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use std::time::Duration;
+    /// # use inekf_client::control::Controller;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut controller = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
+    /// let state = controller.snapshot()?;
+    /// // Its first entry is the variance of the roll, rad^2.
+    /// println!("roll is known to {:.3} rad", state.covariance[0].sqrt());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn snapshot(&mut self) -> Result<StateVector, ControlError> {
         Ok(self.request(CONTROL_SNAPSHOT, StateVector::ZERO)?.state)
     }
@@ -138,6 +237,20 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`].
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use std::time::Duration;
+    /// # use inekf_client::control::Controller;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut controller = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
+    /// let before = controller.barrier()?.counters;
+    /// // .. feed a fix ..
+    /// let after = controller.barrier()?.counters;
+    /// assert!(after.accepted + after.gated > before.accepted + before.gated);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn barrier(&mut self) -> Result<ControlResponse, ControlError> {
         self.request(CONTROL_BARRIER, StateVector::ZERO)
     }
@@ -147,6 +260,44 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`]; refused if the daemon has no smoother, or no state yet.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::control::Controller;
+    /// use inekf_shared::message::{CONTROL_SMOOTHED, ControlResponse};
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// let instance = Instance::new("car")?;
+    /// let (ready, is_ready) = std::sync::mpsc::channel();
+    /// std::thread::scope(|scope| -> Result<(), Box<dyn std::error::Error>> {
+    ///     // What a daemon does, once:
+    ///     scope.spawn(|| -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    ///         let node = node()?;
+    ///         let server = transport::control(&node, &instance)?.server()?;
+    ///         ready.send(())?;
+    ///         loop {
+    ///             let Some(request) = server.receive()? else { continue };
+    ///             assert_eq!(request.kind, CONTROL_SMOOTHED);
+    ///             let request_id = request.request_id;
+    ///             request.send_copy(ControlResponse { request_id, smoothed: 10, ..Default::default() })?;
+    ///             return Ok(());
+    ///         }
+    ///     });
+    ///     is_ready.recv()?;
+    ///     let mut controller = Controller::open_on(node()?, &instance, Duration::from_secs(20))?;
+    ///     // Ten states of the window, to be read under the id of this request.
+    ///     let answer = controller.smoothed()?;
+    ///     assert_eq!((answer.smoothed, answer.request_id), (10, 1));
+    ///     Ok(())
+    /// })?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn smoothed(&mut self) -> Result<ControlResponse, ControlError> {
         self.request(CONTROL_SMOOTHED, StateVector::ZERO)
     }
@@ -155,6 +306,20 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`].
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use std::time::Duration;
+    /// # use inekf_client::control::Controller;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut controller = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
+    /// use inekf_shared::message::STATE_PAUSED;
+    ///
+    /// assert_eq!(controller.pause()?.state_code, STATE_PAUSED);
+    /// controller.unpause()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn pause(&mut self) -> Result<ControlResponse, ControlError> {
         self.request(CONTROL_PAUSE, StateVector::ZERO)
     }
@@ -163,6 +328,19 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`].
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use std::time::Duration;
+    /// # use inekf_client::control::Controller;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut controller = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
+    /// use inekf_shared::message::STATE_PAUSED;
+    ///
+    /// assert_ne!(controller.unpause()?.state_code, STATE_PAUSED);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn unpause(&mut self) -> Result<ControlResponse, ControlError> {
         self.request(CONTROL_RESUME, StateVector::ZERO)
     }
@@ -171,6 +349,18 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`]; refused if a number is out of its range.
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use std::time::Duration;
+    /// # use inekf_client::control::Controller;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut controller = Controller::open(&Instance::new("car")?, Duration::from_secs(1))?;
+    /// let noise = inekf_client::noise::parse("[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n")?;
+    /// controller.reload_noise(noise)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn reload_noise(&mut self, noise: ProcessNoise) -> Result<ControlResponse, ControlError> {
         self.send(ControlRequest {
             kind: CONTROL_RELOAD_NOISE,
@@ -183,6 +373,47 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`]; failed if it is no text, or longer than any configuration.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::control::Controller;
+    /// use inekf_shared::message::{ControlResponse};
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// let instance = Instance::new("car")?;
+    /// let (ready, is_ready) = std::sync::mpsc::channel();
+    /// std::thread::scope(|scope| -> Result<(), Box<dyn std::error::Error>> {
+    ///     // What a daemon does, until it has given the whole text:
+    ///     scope.spawn(|| -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    ///         let node = node()?;
+    ///         let server = transport::control(&node, &instance)?.server()?;
+    ///         ready.send(())?;
+    ///         loop {
+    ///             let Some(request) = server.receive()? else { continue };
+    ///             let text = "model = 'imu'\n".repeat(50);
+    ///             let mut answer = ControlResponse { request_id: request.request_id, ..Default::default() };
+    ///             answer.set_page(&text, request.argument as usize);
+    ///             let is_last = request.argument as usize + answer.page().len() == text.len();
+    ///             request.send_copy(answer)?;
+    ///             if is_last {
+    ///                 return Ok(());
+    ///             }
+    ///         }
+    ///     });
+    ///     is_ready.recv()?;
+    ///     // Longer than one answer holds; it comes whole.
+    ///     let mut controller = Controller::open_on(node()?, &instance, Duration::from_secs(20))?;
+    ///     assert_eq!(controller.config()?, "model = 'imu'\n".repeat(50));
+    ///     Ok(())
+    /// })?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn config(&mut self) -> Result<String, ControlError> {
         let failed = |cause: &str| ControlError::Failed {
             request: control_kind_name(CONTROL_CONFIG),
@@ -218,6 +449,25 @@ impl Controller {
     ///
     /// # Errors
     /// [`ControlError`].
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::control::{ControlError, Controller};
+    /// use inekf_shared::message::{CONTROL_SNAPSHOT, ControlRequest};
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// // Nobody answers: it waits for as long as it may, and says so.
+    /// let mut controller = Controller::open_on(node()?, &Instance::new("car")?, Duration::from_millis(1))?;
+    /// let request = ControlRequest { kind: CONTROL_SNAPSHOT, ..ControlRequest::default() };
+    /// assert!(matches!(controller.send(request), Err(ControlError::Silent { request: "snapshot", .. })));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn send(&mut self, mut asked: ControlRequest) -> Result<ControlResponse, ControlError> {
         let request = control_kind_name(asked.kind);
         let failed = |cause: String| ControlError::Failed { request, cause };

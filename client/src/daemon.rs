@@ -26,6 +26,19 @@ const STOP_WITHIN: Duration = Duration::from_secs(5);
 
 /// A running daemon. It is stopped when dropped, and also when the thread that started it is gone
 /// for another reason, such as a kill.
+///
+/// It is not run here, for it starts the program `inekf-service`:
+///
+/// ```no_run
+/// use std::path::Path;
+///
+/// use inekf_client::daemon::{Daemon, private_instance};
+///
+/// let mut daemon = Daemon::start(Path::new("car.toml"), &private_instance("trial")?)?;
+/// assert!(daemon.ready_line().starts_with("ready") && daemon.is_running());
+/// daemon.stop()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Daemon {
     child: Child,
@@ -38,6 +51,19 @@ impl Daemon {
     /// # Errors
     /// The program is not found or stops before it is ready; what it wrote to standard error has
     /// gone to this process's.
+    ///
+    /// It is not run here, for it starts the program `inekf-service`:
+    ///
+    /// ```no_run
+    /// use std::path::Path;
+    ///
+    /// use inekf_client::daemon::{Daemon, private_instance};
+    ///
+    /// // Dropped, it is stopped as well.
+    /// let daemon = Daemon::start(Path::new("car.toml"), &private_instance("trial")?)?;
+    /// println!("process {}", daemon.id());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn start(config: &Path, instance: &Instance) -> anyhow::Result<Self> {
         Self::start_with(config, instance.as_str(), &[], READY_WITHIN)
     }
@@ -46,6 +72,18 @@ impl Daemon {
     ///
     /// # Errors
     /// As [`Daemon::start`].
+    ///
+    /// It is not run here, for it starts the program `inekf-service`:
+    ///
+    /// ```no_run
+    /// use std::path::Path;
+    ///
+    /// use inekf_client::daemon::Daemon;
+    ///
+    /// let daemon = Daemon::start_fleet(Path::new("car.toml"), "car-{1..100}")?;
+    /// println!("{}", daemon.ready_line());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn start_fleet(config: &Path, instances: &str) -> anyhow::Result<Self> {
         Self::start_with(config, instances, &[], FLEET_READY_WITHIN)
     }
@@ -54,6 +92,19 @@ impl Daemon {
     ///
     /// # Errors
     /// As [`Daemon::start`].
+    ///
+    /// It is not run here, for it starts the program `inekf-service`:
+    ///
+    /// ```no_run
+    /// use std::path::Path;
+    ///
+    /// use inekf_client::daemon::{Daemon, private_instance};
+    ///
+    /// // It takes what `ControlRequest`s of the kind `CONTROL_TAKE` bring, and nothing else.
+    /// let daemon = Daemon::start_stepped(Path::new("recorded.toml"), &private_instance("again")?)?;
+    /// daemon.stop()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn start_stepped(config: &Path, instance: &Instance) -> anyhow::Result<Self> {
         Self::start_with(config, instance.as_str(), &["--stepped"], READY_WITHIN)
     }
@@ -217,6 +268,16 @@ fn program() -> anyhow::Result<PathBuf> {
 }
 
 /// An instance name that no other process uses: for a daemon of one's own.
+///
+/// ```
+/// use inekf_client::daemon::private_instance;
+///
+/// let instance = private_instance("replay")?;
+/// assert_eq!(instance.as_str(), format!("replay-{}", std::process::id()));
+/// // What cannot be a name is refused.
+/// assert!(private_instance("a/b").is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn private_instance(purpose: &str) -> anyhow::Result<Instance> {
     let name = format!("{purpose}-{}", std::process::id());
     Instance::new(&name).context("making an instance name")

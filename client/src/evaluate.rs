@@ -31,6 +31,17 @@ use crate::table::{EstimateRow, EstimateState, Layout};
 
 /// A motion at one time, from the truth or an estimate. In the plane z is 0, and attitude a turn
 /// about z.
+///
+/// ```
+/// use inekf_client::evaluate::Pose;
+/// use nalgebra::{UnitQuaternion, Vector3};
+///
+/// let north = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 90_f64.to_radians());
+/// let pose = Pose { stamp_ns: 0, q_wb: north, v_w_mps: None, p_w_m: Vector3::zeros() };
+/// // Body to world: forwards is north, left is west.
+/// assert!((pose.q_wb * Vector3::x() - Vector3::y()).norm() < 1e-15);
+/// assert!((pose.heading_rad().to_degrees() - 90.0).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Stamp, ns.
@@ -78,6 +89,18 @@ impl Pose {
 }
 
 /// Poses in the order of their stamps, which differ.
+///
+/// ```
+/// use inekf_client::evaluate::{Trajectory, estimate_pose};
+/// use inekf_client::table::EstimateState;
+///
+/// let pose = |stamp_ns, x_m| {
+///     estimate_pose(stamp_ns, &EstimateState::Plane { theta_rad: 0.0, p_w_m: [x_m, 0.0] })
+/// };
+/// // Sorted, and of two with one stamp the first.
+/// let way = Trajectory::new_planar(vec![pose(20, 2.0), pose(10, 1.0), pose(10, 7.0)]);
+/// assert_eq!(way.poses(), [pose(10, 1.0), pose(20, 2.0)]);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
     poses: Vec<Pose>,
@@ -96,6 +119,18 @@ impl Trajectory {
     }
 
     /// A trajectory in the plane; [`errors`] then looks at the other one in the plane, too.
+    ///
+    /// ```
+    /// use inekf_client::evaluate::{DEFAULT_MAX_GAP_NS, Trajectory, errors, estimate_pose};
+    /// use inekf_client::table::EstimateState;
+    ///
+    /// // An estimate in the plane is not blamed for the hill that the truth climbs.
+    /// let flat = EstimateState::Plane { theta_rad: 0.0, p_w_m: [1.0, 0.0] };
+    /// let hill = EstimateState::Pose { q_wb: [0.0, 0.0, 0.0, 1.0], p_w_m: [1.0, 0.0, 30.0] };
+    /// let estimate = Trajectory::new_planar(vec![estimate_pose(0, &flat)]);
+    /// let truth = Trajectory::new(vec![estimate_pose(0, &hill)]);
+    /// assert_eq!(errors(&estimate, &truth, DEFAULT_MAX_GAP_NS)[0].position_m.norm(), 0.0);
+    /// ```
     pub fn new_planar(poses: Vec<Pose>) -> Self {
         Self {
             planar: true,
@@ -104,6 +139,17 @@ impl Trajectory {
     }
 
     /// The trajectory of a truth.
+    ///
+    /// ```
+    /// use inekf_client::evaluate::Trajectory;
+    /// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+    ///
+    /// let options = SimulationOptions { duration_s: 1.0, ..SimulationOptions::default() };
+    /// let truth = Trajectory::from_truth(&simulate(Scenario::DroneLoops, &options)?.truth);
+    /// let first = truth.poses()[0];
+    /// assert!((first.p_w_m - Scenario::DroneLoops.at(0.0).p_w_m).norm() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn from_truth(truth: &Truth) -> Self {
         match truth {
             Truth::None => Self::default(),
@@ -126,6 +172,16 @@ impl Trajectory {
     }
 
     /// The trajectory of an estimate CSV.
+    ///
+    /// ```
+    /// use inekf_client::evaluate::Trajectory;
+    /// use inekf_client::table::read_estimates;
+    ///
+    /// let table = read_estimates("estimate.csv", &b"t_ns,theta,x,y\n10,0.5,1.0,2.0\n"[..])?;
+    /// let trajectory = Trajectory::from_estimates(&table.rows);
+    /// assert_eq!(trajectory.poses()[0].p_w_m.y, 2.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn from_estimates(rows: &[EstimateRow]) -> Self {
         let poses = rows
             .iter()
@@ -144,6 +200,22 @@ impl Trajectory {
 
     /// The pose at a stamp: exact where there is one, else interpolated between the two around it
     /// if they are at most `max_gap_ns` apart. `None` outside the trajectory and in longer gaps.
+    ///
+    /// ```
+    /// use inekf_client::evaluate::{Trajectory, estimate_pose};
+    /// use inekf_client::table::EstimateState;
+    ///
+    /// let pose = |stamp_ns, theta_deg: f64| {
+    ///     let theta_rad = theta_deg.to_radians();
+    ///     estimate_pose(stamp_ns, &EstimateState::Plane { theta_rad, p_w_m: [0.0, 0.0] })
+    /// };
+    /// // From 170 to -170 degrees the shorter way leads over 180.
+    /// let turn = Trajectory::new_planar(vec![pose(0, 170.0), pose(100, -170.0)]);
+    /// let half = turn.at(50, 100).expect("between them");
+    /// assert!((half.heading_rad().to_degrees().abs() - 180.0).abs() < 1e-9);
+    /// // Never over longer gaps, never beyond the end.
+    /// assert!(turn.at(50, 99).is_none() && turn.at(101, 1000).is_none());
+    /// ```
     pub fn at(&self, stamp_ns: u64, max_gap_ns: u64) -> Option<Pose> {
         let after = self.poses.partition_point(|pose| pose.stamp_ns < stamp_ns);
         let next = self.poses.get(after)?;
@@ -157,6 +229,16 @@ impl Trajectory {
 }
 
 /// The pose that an estimate's mean is.
+///
+/// ```
+/// use inekf_client::evaluate::estimate_pose;
+/// use inekf_client::table::EstimateState;
+///
+/// let pose = estimate_pose(3, &EstimateState::Plane { theta_rad: 0.5, p_w_m: [1.0, 2.0] });
+/// // In the plane z is zero, and a velocity is not estimated.
+/// assert_eq!((pose.p_w_m.z, pose.v_w_mps), (0.0, None));
+/// assert!((pose.heading_rad() - 0.5).abs() < 1e-15);
+/// ```
 pub fn estimate_pose(stamp_ns: u64, state: &EstimateState) -> Pose {
     match *state {
         EstimateState::Navigation {
@@ -184,6 +266,20 @@ pub fn estimate_pose(stamp_ns: u64, state: &EstimateState) -> Pose {
 pub const DEFAULT_MAX_GAP_NS: u64 = 1_000_000_000;
 
 /// The error of an estimate at one stamp.
+///
+/// ```
+/// use inekf_client::evaluate::{ErrorSample, estimate_pose};
+/// use inekf_client::table::EstimateState;
+///
+/// let pose = |theta_deg: f64, x_m| {
+///     let theta_rad = theta_deg.to_radians();
+///     estimate_pose(0, &EstimateState::Plane { theta_rad, p_w_m: [x_m, 0.0] })
+/// };
+/// // Estimate minus truth, wrapped: 179 degrees against -179 are two degrees too little.
+/// let error = ErrorSample::between(&pose(179.0, 1.0), &pose(-179.0, 1.5));
+/// assert!((error.heading_rad.to_degrees() + 2.0).abs() < 1e-9);
+/// assert!((error.position_m.x + 0.5).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorSample {
     /// Stamp, ns.
@@ -200,6 +296,23 @@ pub struct ErrorSample {
 
 impl ErrorSample {
     /// The error of `estimate` against the truth at the same time.
+    ///
+    /// ```
+    /// use inekf_client::evaluate::{ErrorSample, Pose};
+    /// use nalgebra::{UnitQuaternion, Vector3};
+    ///
+    /// let level = Pose {
+    ///     stamp_ns: 0,
+    ///     q_wb: UnitQuaternion::identity(),
+    ///     v_w_mps: None,
+    ///     p_w_m: Vector3::zeros(),
+    /// };
+    /// let rolled = Pose { q_wb: UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0), ..level };
+    /// // A roll is an error of attitude, not of heading; a velocity that one does not know is none.
+    /// let error = ErrorSample::between(&rolled, &level);
+    /// assert!((error.attitude_rad - 0.1).abs() < 1e-12 && error.heading_rad.abs() < 1e-15);
+    /// assert!(error.velocity_mps.is_none());
+    /// ```
     pub fn between(estimate: &Pose, truth: &Pose) -> Self {
         let velocity = estimate.v_w_mps.zip(truth.v_w_mps);
         Self {
@@ -214,6 +327,19 @@ impl ErrorSample {
 
 /// The errors at every stamp of the estimate at which the truth is known. If one of the two is in
 /// the plane, both are compared there: no height, no tilt.
+///
+/// ```
+/// use inekf_client::evaluate::{DEFAULT_MAX_GAP_NS, Trajectory, errors};
+/// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+///
+/// let options = SimulationOptions { duration_s: 1.0, ..SimulationOptions::default() };
+/// let truth = Trajectory::from_truth(&simulate(Scenario::RoadCircuit, &options)?.truth);
+/// // Against itself: as many as there are poses, all zero.
+/// let errors = errors(&truth, &truth, DEFAULT_MAX_GAP_NS);
+/// assert_eq!(errors.len(), truth.poses().len());
+/// assert!(errors.iter().all(|error| error.position_m.norm() == 0.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn errors(estimate: &Trajectory, truth: &Trajectory, max_gap_ns: u64) -> Vec<ErrorSample> {
     let planar = estimate.planar || truth.planar;
     let error = |estimate: &Pose| {
@@ -228,6 +354,23 @@ pub fn errors(estimate: &Trajectory, truth: &Trajectory, max_gap_ns: u64) -> Vec
 }
 
 /// Figures over a run. RMSE is the root of the mean square, not reduced by the mean.
+///
+/// ```
+/// use inekf_client::evaluate::{ErrorSample, summarise};
+/// use nalgebra::Vector3;
+///
+/// let off = |x_m, y_m| ErrorSample {
+///     stamp_ns: 0,
+///     position_m: Vector3::new(x_m, y_m, 0.0),
+///     velocity_mps: None,
+///     heading_rad: 0.0,
+///     attitude_rad: 0.0,
+/// };
+/// // A constant error is not taken off: the root of the mean square, by axis and as a distance.
+/// let summary = summarise(&[off(3.0, 4.0), off(3.0, -4.0)], 0).expect("two errors");
+/// assert_eq!(summary.position_rmse_m, Vector3::new(3.0, 4.0, 0.0));
+/// assert_eq!((summary.horizontal_rmse_m, summary.distance_max_m), (5.0, 5.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summary {
     /// Number of errors they are taken over.
@@ -253,6 +396,23 @@ pub struct Summary {
 }
 
 /// Sums up the errors from `start_ns` on; `None` if there are none.
+///
+/// ```
+/// use inekf_client::evaluate::{ErrorSample, summarise};
+/// use nalgebra::Vector3;
+///
+/// let off = |stamp_ns, x_m| ErrorSample {
+///     stamp_ns,
+///     position_m: Vector3::new(x_m, 0.0, 0.0),
+///     velocity_mps: None,
+///     heading_rad: 0.0,
+///     attitude_rad: 0.0,
+/// };
+/// // What came before the filter had converged can be left out.
+/// let run = [off(0, 50.0), off(10, 1.0), off(20, 1.0)];
+/// assert_eq!(summarise(&run, 10).map(|summary| summary.distance_rmse_m), Some(1.0));
+/// assert!(summarise(&run, 30).is_none());
+/// ```
 pub fn summarise(errors: &[ErrorSample], start_ns: u64) -> Option<Summary> {
     let late: Vec<&ErrorSample> = errors.iter().filter(|e| e.stamp_ns >= start_ns).collect();
     if late.is_empty() {
@@ -288,6 +448,21 @@ pub fn summarise(errors: &[ErrorSample], start_ns: u64) -> Option<Summary> {
 }
 
 /// One-sigma deviations of an estimate in world axes, to first order of its error.
+///
+/// ```
+/// use inekf_client::evaluate::deviations;
+/// use inekf_client::table::{EstimateRow, EstimateState};
+///
+/// let row = EstimateRow {
+///     stamp_ns: 0,
+///     state: EstimateState::Plane { theta_rad: 0.0, p_w_m: [0.0; 2] },
+///     covariance: vec![0.04, 0.0, 0.0, 4.0, 0.0, 9.0],
+/// };
+/// // Roots of variances.
+/// let sigma = deviations(&row).expect("a covariance");
+/// assert!((sigma.heading_rad - 0.2).abs() < 1e-15);
+/// assert!((sigma.position_m.y - 3.0).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviations {
     /// Position by axis, m; z is 0 in the plane.

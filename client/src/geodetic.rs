@@ -28,6 +28,14 @@ const F: f64 = 1.0 / 298.257_223_563;
 const E2: f64 = F * (2.0 - F);
 
 /// A place by latitude, longitude and height.
+///
+/// ```
+/// use inekf_client::geodetic::Geodetic;
+///
+/// // Where the equator meets the zero meridian: the semi-major axis along X.
+/// let origin = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
+/// assert_eq!(origin.ecef_m(), [6_378_137.0, 0.0, 0.0]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geodetic {
     /// Latitude, degrees, north positive.
@@ -40,12 +48,29 @@ pub struct Geodetic {
 
 impl Geodetic {
     /// Whether it is a place: finite, latitude within 90 degrees, longitude within 360, height within 10 000 km.
+    ///
+    /// ```
+    /// use inekf_client::geodetic::Geodetic;
+    ///
+    /// let place = Geodetic { lat_deg: 47.0, lon_deg: 8.0, alt_m: 400.0 };
+    /// assert!(place.is_valid());
+    /// assert!(!Geodetic { lat_deg: 97.0, ..place }.is_valid());
+    /// assert!(!Geodetic { alt_m: f64::NAN, ..place }.is_valid());
+    /// ```
     #[must_use]
     pub fn is_valid(&self) -> bool {
         self.lat_deg.abs() <= 90.0 && self.lon_deg.abs() <= 360.0 && self.alt_m.abs() <= 1e7
     }
 
     /// Earth-centred, earth-fixed coordinates, m.
+    ///
+    /// ```
+    /// use inekf_client::geodetic::Geodetic;
+    ///
+    /// // A pole lies on the semi-minor axis, 21 km nearer to the centre than the equator.
+    /// let [_, _, z_m] = Geodetic { lat_deg: 90.0, lon_deg: 0.0, alt_m: 0.0 }.ecef_m();
+    /// assert!((z_m - 6_356_752.314).abs() < 1e-3);
+    /// ```
     #[must_use]
     pub fn ecef_m(&self) -> [f64; 3] {
         let (sin_lat, cos_lat) = self.lat_deg.to_radians().sin_cos();
@@ -60,6 +85,14 @@ impl Geodetic {
     }
 
     /// The place of earth-centred coordinates.
+    ///
+    /// ```
+    /// use inekf_client::geodetic::Geodetic;
+    ///
+    /// let here = Geodetic { lat_deg: -33.9, lon_deg: 18.4, alt_m: 1085.0 };
+    /// let again = Geodetic::from_ecef_m(here.ecef_m());
+    /// assert!((again.lat_deg - here.lat_deg).abs() < 1e-12 && (again.alt_m - here.alt_m).abs() < 1e-6);
+    /// ```
     #[must_use]
     pub fn from_ecef_m([x, y, z]: [f64; 3]) -> Self {
         let from_axis = x.hypot(y);
@@ -82,6 +115,13 @@ impl Geodetic {
 }
 
 /// A world frame: its origin and its axes.
+///
+/// ```
+/// use inekf_client::geodetic::{Geodetic, LocalFrame};
+///
+/// let frame = LocalFrame::new(Geodetic { lat_deg: 52.0, lon_deg: 13.0, alt_m: 40.0 });
+/// assert_eq!(frame.enu_m(frame.origin()), [0.0; 3]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalFrame {
     origin: Geodetic,
@@ -120,6 +160,15 @@ impl LocalFrame {
     }
 
     /// A place in the frame: east, north, up, m.
+    ///
+    /// ```
+    /// use inekf_client::geodetic::{Geodetic, LocalFrame};
+    ///
+    /// let here = Geodetic { lat_deg: 52.0, lon_deg: 13.0, alt_m: 40.0 };
+    /// // Ten metres higher at the same place is ten metres up.
+    /// let [east, north, up] = LocalFrame::new(here).enu_m(Geodetic { alt_m: 50.0, ..here });
+    /// assert!(east.abs() < 1e-8 && north.abs() < 1e-8 && (up - 10.0).abs() < 1e-8);
+    /// ```
     #[must_use]
     pub fn enu_m(&self, place: Geodetic) -> [f64; 3] {
         let from_origin = Vector3::from(place.ecef_m()) - self.origin_ecef_m;
@@ -127,6 +176,16 @@ impl LocalFrame {
     }
 
     /// The place of a point of the frame.
+    ///
+    /// ```
+    /// use inekf_client::geodetic::{Geodetic, LocalFrame};
+    ///
+    /// let frame = LocalFrame::new(Geodetic { lat_deg: 52.0, lon_deg: 13.0, alt_m: 40.0 });
+    /// let place = frame.geodetic([1000.0, -500.0, 20.0]);
+    /// assert!(place.lon_deg > 13.0 && place.lat_deg < 52.0);
+    /// let [east, north, up] = frame.enu_m(place);
+    /// assert!((east - 1000.0).abs() < 1e-6 && (north + 500.0).abs() < 1e-6 && (up - 20.0).abs() < 1e-6);
+    /// ```
     #[must_use]
     pub fn geodetic(&self, enu_m: [f64; 3]) -> Geodetic {
         let ecef = self.origin_ecef_m + self.r_we.transpose() * Vector3::from(enu_m);

@@ -9,6 +9,21 @@ use crate::dataset::{Initial, Meta};
 use crate::model::Model;
 
 /// An initial state that is not one of the daemon's model. `Display` is one line.
+///
+/// ```
+/// use inekf_client::dataset::{Initial, Meta};
+/// use inekf_client::initial::{InitialError, state_vector};
+/// use inekf_client::model::Model;
+///
+/// let initial = Initial::Planar { stamp_ns: 0, theta_rad: 0.0, p_w_m: [0.0; 2] };
+/// let meta = Meta { initial: Some(initial), p0_diag: Some(vec![1.0; 6]), ..Meta::default() };
+/// // A pose in the plane has three variances, and does not start a flight.
+/// assert!(matches!(
+///     state_vector(&meta, Model::Odometry2d),
+///     Err(InitialError::Dimension { found: 6, .. })
+/// ));
+/// assert!(matches!(state_vector(&meta, Model::Imu), Err(InitialError::Kind { .. })));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InitialError {
     /// It is of the plane and the model of space, or the other way round.

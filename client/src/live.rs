@@ -10,6 +10,15 @@ use crate::pace::Pace;
 use crate::progress::Progress;
 
 /// What a live feed did.
+///
+/// ```
+/// use inekf_client::live::LiveSummary;
+///
+/// // A feed that was heard to its end, and one that began before its daemon.
+/// let whole = LiveSummary { sent: 2000, unheard: 0 };
+/// let early = LiveSummary { sent: 2000, unheard: 150 };
+/// assert!(whole.unheard == 0 && early.unheard < early.sent);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LiveSummary {
     /// Rows sent.

@@ -42,6 +42,14 @@ impl Model {
     pub const ALL: [Self; 3] = [Self::Imu, Self::Odometry3d, Self::Odometry2d];
 
     /// The model of a `MODEL_*` code; `None` for a code that is not defined.
+    ///
+    /// ```
+    /// use inekf_client::model::Model;
+    /// use inekf_shared::message::MODEL_IMU;
+    ///
+    /// assert_eq!(Model::from_code(MODEL_IMU), Some(Model::Imu));
+    /// assert_eq!(Model::from_code(99), None);
+    /// ```
     pub fn from_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|model| model.code() == code)
     }
@@ -56,6 +64,13 @@ impl Model {
     }
 
     /// The name in a configuration file.
+    ///
+    /// ```
+    /// use inekf_client::model::Model;
+    ///
+    /// // As in `model = "odometry3d"`.
+    /// assert_eq!(Model::Odometry3d.name(), "odometry3d");
+    /// ```
     pub fn name(self) -> &'static str {
         model_name(self.code())
     }
@@ -68,6 +83,24 @@ impl fmt::Display for Model {
 }
 
 /// An estimate of one model, as the estimate CSV shows it.
+///
+/// ```
+/// use inekf_client::model::Estimate;
+/// use inekf_client::table::EstimateState;
+/// use inekf_shared::message::{EstimateMessage, EstimateSe2, Zero};
+///
+/// /// Whatever the model.
+/// fn first_variance<E: Estimate>(estimate: &E) -> f64 {
+///     estimate.covariance()[0]
+/// }
+///
+/// let mut plane = EstimateSe2::ZERO;
+/// plane.theta_rad = 0.5;
+/// plane.covariance[0] = 0.04; // of theta, rad^2
+/// assert_eq!(first_variance(&plane), 0.04);
+/// assert_eq!(plane.mean(), EstimateState::Plane { theta_rad: 0.5, p_w_m: [0.0; 2] });
+/// assert_eq!(EstimateSe2::KIND.code(), EstimateSe2::MODEL);
+/// ```
 pub trait Estimate: EstimateMessage {
     /// The model it is of.
     const KIND: Model;

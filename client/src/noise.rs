@@ -13,6 +13,19 @@ use toml::{Table, Value};
 ///
 /// # Errors
 /// The file cannot be read, or its table `[noise]` is not one of a configuration; the error names the key.
+///
+/// ```
+/// use inekf_shared::message::NOISE_DENSITY;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("car.toml");
+/// std::fs::write(&path, "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n")?;
+/// let noise = inekf_client::noise::load(&path)?;
+/// assert_eq!((noise.form, noise.rotation, noise.translation), (NOISE_DENSITY, 3e-4, 2e-2));
+/// // What is not given is NaN: the daemon takes its default.
+/// assert!(noise.gyro_bias_walk.is_nan());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn load(path: &Path) -> anyhow::Result<ProcessNoise> {
     let read = fs::read_to_string(path).map_err(anyhow::Error::from);
     read.and_then(|text| parse(&text))

@@ -5,6 +5,14 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 /// How fast recorded time passes.
+///
+/// ```
+/// use inekf_client::pace::Speed;
+///
+/// assert_eq!("max".parse(), Ok(Speed::Max));
+/// assert_eq!("0.5".parse(), Ok(Speed::Times(0.5)));
+/// assert!("0".parse::<Speed>().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Speed {
     /// This many times real time.
@@ -68,12 +76,35 @@ impl Pace {
     }
 
     /// When `stamp_ns` is due.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::pace::Pace;
+    ///
+    /// // At half speed a second of data takes two, and what is in the past is due at once.
+    /// let pace = Pace::new(5_000_000_000, 0.5);
+    /// let start = pace.deadline(5_000_000_000);
+    /// assert_eq!(pace.deadline(6_000_000_000) - start, Duration::from_secs(2));
+    /// assert_eq!(pace.deadline(1), start);
+    /// ```
     pub fn deadline(&self, stamp_ns: u64) -> Instant {
         let ahead_s = stamp_ns.saturating_sub(self.first_ns) as f64 * 1e-9 / self.times;
         self.start + Duration::from_secs_f64(ahead_s)
     }
 
     /// Waits until `stamp_ns` is due, asleep for most of it.
+    ///
+    /// ```
+    /// use std::time::Instant;
+    ///
+    /// use inekf_client::pace::Pace;
+    ///
+    /// let pace = Pace::new(0, 1.0);
+    /// pace.wait(1_000_000);
+    /// // Never too early.
+    /// assert!(Instant::now() >= pace.deadline(1_000_000));
+    /// ```
     pub fn wait(&self, stamp_ns: u64) {
         let deadline = self.deadline(stamp_ns);
         let ahead = deadline.saturating_duration_since(Instant::now());

@@ -32,6 +32,13 @@ const SMOOTHED: &str = "inekf-smoothed";
 const LATEST: &str = "inekf-latest";
 
 /// Estimates or smoothed states could not be received.
+///
+/// ```
+/// use inekf_client::read::ReadError;
+///
+/// let error = ReadError { cause: "ExceedsMaxBorrows".to_owned() };
+/// assert_eq!(error.to_string(), "receiving from the daemon: ExceedsMaxBorrows");
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[error("receiving from the daemon: {cause}")]
 pub struct ReadError {
@@ -43,6 +50,16 @@ pub struct ReadError {
 ///
 /// # Errors
 /// [`TransportError`], naming the service and the remedy.
+///
+/// ```
+/// use inekf_client::read::model_of;
+/// use inekf_shared::topic::Instance;
+///
+/// // Of an instance that nobody has started.
+/// let nobody = Instance::new(&format!("doc-{}", std::process::id()))?;
+/// assert_eq!(model_of(&nobody)?, None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn model_of(instance: &Instance) -> Result<Option<Model>, TransportError> {
     let node = transport::open_node("inekf-model")?;
     Ok(transport::estimate_model(&node, instance)?.and_then(Model::from_code))
@@ -80,6 +97,35 @@ impl<M: Message> Listening<M> {
 }
 
 /// Receives every estimate of one daemon, in order, and counts those it missed.
+///
+/// ```
+/// use inekf_client::read::EstimateReader;
+/// use inekf_shared::message::{EstimateSe23, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = || transport::open_node_with("doc", &config);
+/// let instance = Instance::new("car")?;
+/// let mut reader = EstimateReader::<EstimateSe23>::open_on(node()?, &instance)?;
+/// // What a daemon does:
+/// let daemon = node()?;
+/// let publisher = transport::estimate(&daemon, &instance)?.publisher()?;
+/// for estimate_seq in [1, 2, 5] {
+///     let mut estimate = EstimateSe23::ZERO;
+///     estimate.head.estimate_seq = estimate_seq;
+///     publisher.send_copy(estimate)?;
+/// }
+/// let mut numbers = Vec::new();
+/// while let Some(estimate) = reader.next_estimate()? {
+///     numbers.push(estimate.head.estimate_seq);
+/// }
+/// // In order, and the gap is counted.
+/// assert_eq!((numbers, reader.missed()), (vec![1, 2, 5], 2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct EstimateReader<E: EstimateMessage = EstimateSe23> {
     estimates: Listening<E>,
     next_seq: Option<u64>,
@@ -99,6 +145,23 @@ impl<E: EstimateMessage> EstimateReader<E> {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
+    ///
+    /// A node under a configuration of one's own keeps a test apart from all else:
+    ///
+    /// ```
+    /// use inekf_client::read::EstimateReader;
+    /// use inekf_shared::message::EstimateSe23;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// let config = transport::config(root.path().to_str(), prefix)?;
+    /// let node = transport::open_node_with("my-test", &config)?;
+    /// let mut reader = EstimateReader::<EstimateSe23>::open_on(node, &Instance::new("car")?)?;
+    /// assert!(reader.next_estimate()?.is_none() && reader.missed() == 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
         let open = |node: &Node, instance: &Instance| {
             transport::estimate::<E>(node, instance)?.subscriber()
@@ -121,6 +184,28 @@ impl<E: EstimateMessage> EstimateReader<E> {
     ///
     /// # Errors
     /// [`ReadError`].
+    ///
+    /// ```
+    /// # use inekf_client::read::EstimateReader;
+    /// # use inekf_shared::message::{EstimateSe23, Zero};
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let instance = Instance::new("car")?;
+    /// # let mut reader = EstimateReader::<EstimateSe23>::open_on(node()?, &instance)?;
+    /// # let daemon = node()?;
+    /// # let publisher = transport::estimate(&daemon, &instance)?.publisher()?;
+    /// publisher.send_copy(EstimateSe23 { p_w_m: [1.0, 2.0, 3.0], ..EstimateSe23::ZERO })?;
+    /// if let Some(estimate) = reader.borrow_next()? {
+    ///     // Read where it lies: 1288 bytes that are not copied.
+    ///     assert_eq!(estimate.p_w_m[1], 2.0);
+    /// }
+    /// assert!(reader.borrow_next()?.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn borrow_next(&mut self) -> Result<Option<Received<E>>, ReadError> {
         let received = self.estimates.receive()?;
         if let Some(estimate) = &received {
@@ -140,6 +225,25 @@ impl<E: EstimateMessage> EstimateReader<E> {
     ///
     /// # Errors
     /// [`ReadError`].
+    ///
+    /// ```
+    /// # use inekf_client::read::EstimateReader;
+    /// # use inekf_shared::message::{EstimateSe23, Zero};
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let instance = Instance::new("car")?;
+    /// # let mut reader = EstimateReader::<EstimateSe23>::open_on(node()?, &instance)?;
+    /// # let daemon = node()?;
+    /// # let publisher = transport::estimate(&daemon, &instance)?.publisher()?;
+    /// publisher.send_copy(EstimateSe23 { v_w_mps: [0.5, 0.0, 0.0], ..EstimateSe23::ZERO })?;
+    /// let copy = reader.next_estimate()?.expect("one was published");
+    /// assert_eq!(copy.v_w_mps[0], 0.5);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn next_estimate(&mut self) -> Result<Option<E>, ReadError> {
         Ok(self.borrow_next()?.map(|estimate| *estimate))
     }
@@ -152,6 +256,32 @@ impl<E: EstimateMessage> EstimateReader<E> {
 
 /// Receives the smoothed states of one daemon, in order, and counts those it missed: each state that leaves the
 /// window, and the whole window when a request asks for it.
+///
+/// ```
+/// use inekf_client::read::SmoothedReader;
+/// use inekf_shared::message::{SmoothedState, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = || transport::open_node_with("doc", &config);
+/// let instance = Instance::new("car")?;
+/// let mut reader = SmoothedReader::open_on(node()?, &instance)?;
+/// // What a daemon does: states leave the window, oldest first; one of them was overwritten.
+/// let daemon = node()?;
+/// let publisher = transport::smoothed(&daemon, &instance)?.publisher()?;
+/// for index in [0, 1, 3] {
+///     publisher.send_copy(SmoothedState { index, stamp_ns: 100 * index, ..SmoothedState::ZERO })?;
+/// }
+/// let mut stamps_ns = Vec::new();
+/// while let Some(state) = reader.next_state()? {
+///     stamps_ns.push(state.stamp_ns);
+/// }
+/// assert_eq!((stamps_ns, reader.missed()), (vec![0, 100, 300], 1));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct SmoothedReader {
     states: Listening<SmoothedState>,
     next_index: Option<u64>,
@@ -185,6 +315,25 @@ impl SmoothedReader {
     ///
     /// # Errors
     /// [`ReadError`].
+    ///
+    /// ```
+    /// # use inekf_client::read::SmoothedReader;
+    /// # use inekf_shared::message::{SmoothedState, Zero};
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let (instance, daemon) = (Instance::new("car")?, node()?);
+    /// # let mut reader = SmoothedReader::open_on(node()?, &instance)?;
+    /// # let publisher = transport::smoothed(&daemon, &instance)?.publisher()?;
+    /// // A state that answers a request is still in the window; its place there is no gap.
+    /// publisher.send_copy(SmoothedState { request_id: 7, index: 4, ..SmoothedState::ZERO })?;
+    /// let state = reader.next_state()?.expect("one was published");
+    /// assert_eq!((state.request_id, reader.missed()), (7, 0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn next_state(&mut self) -> Result<Option<SmoothedState>, ReadError> {
         let received = self.states.receive()?;
         Ok(received.map(|state| {
@@ -208,6 +357,33 @@ impl SmoothedReader {
 }
 
 /// Reads the newest estimate only, as a controller would.
+///
+/// ```
+/// use inekf_client::read::LatestEstimate;
+/// use inekf_shared::message::{EstimateSe23, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = || transport::open_node_with("doc", &config);
+/// let instance = Instance::new("car")?;
+/// // What a daemon does:
+/// let daemon = node()?;
+/// let writer = transport::latest(&daemon, &instance, EstimateSe23::ZERO)?.writer()?;
+/// let newest = LatestEstimate::<EstimateSe23>::open_on(node()?, &instance)?;
+/// // Before the first.
+/// assert_eq!(newest.read().head.estimate_seq, 0);
+/// for estimate_seq in 1..=3 {
+///     let mut estimate = EstimateSe23::ZERO;
+///     estimate.head.estimate_seq = estimate_seq;
+///     assert!(writer.write(estimate));
+/// }
+/// // However slow the reader: the newest, and only that.
+/// assert_eq!(newest.read().head.estimate_seq, 3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct LatestEstimate<E: EstimateMessage = EstimateSe23> {
     state: RefCell<LatestState<E>>,
 }

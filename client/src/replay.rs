@@ -23,6 +23,24 @@ use crate::smoothed::SmoothedOutput;
 use crate::table::EstimateWriter;
 
 /// What to replay, and how.
+///
+/// ```
+/// use inekf_client::pace::Speed;
+/// use inekf_client::replay::ReplayOptions;
+/// use inekf_shared::topic::Instance;
+///
+/// let options = ReplayOptions {
+///     dir: "flight".into(),
+///     config: None, // a daemon that runs already is fed: that of `instance`
+///     speed: Speed::Times(1.0),
+///     out: "estimate.csv".into(),
+///     smoothed: None,
+///     covariance: false,
+///     instance: Instance::new("car")?,
+/// };
+/// assert_eq!(options.instance.as_str(), "car");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct ReplayOptions {
     /// The dataset folder.
@@ -42,6 +60,24 @@ pub struct ReplayOptions {
 }
 
 /// What a replay did.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_client::replay::ReplaySummary;
+/// use inekf_shared::message::{ControlResponse, Zero};
+///
+/// let summary = ReplaySummary {
+///     sent: 12_300,
+///     rows: 12_000,
+///     smoothed_rows: 0,
+///     took: Duration::from_millis(600),
+///     last: ControlResponse::ZERO,
+/// };
+/// // A minute at 200 Hz in 0.6 s; a fix has no row of its own.
+/// assert!(summary.rows as f64 / 200.0 / summary.took.as_secs_f64() > 99.0);
+/// assert!(summary.rows < summary.sent && summary.last.counters.lost == 0);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ReplaySummary {
     /// Rows of sensors sent.

@@ -17,6 +17,15 @@ use crate::plot::{
 use crate::table::EstimateRow;
 
 /// The normalised innovation squared of one fix.
+///
+/// ```
+/// use inekf_client::consistency::band_95;
+/// use inekf_client::report::NisSample;
+///
+/// let nis = NisSample { stamp_ns: 0, nis: 12.0, degrees: 3 };
+/// // Larger than what a fix that fits its covariance gives in 97.5 % of all cases.
+/// assert!(nis.nis > band_95(nis.degrees).1);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NisSample {
     /// Stamp of the fix's estimate, ns.
@@ -28,6 +37,28 @@ pub struct NisSample {
 }
 
 /// What a report is made of; every list may be empty.
+///
+/// ```
+/// use inekf_client::dataset::Truth;
+/// use inekf_client::report::{Material, build};
+///
+/// let nothing = Material {
+///     title: "Nothing",
+///     subtitle: "at all",
+///     rows: &[],
+///     truth: &Truth::None,
+///     fixes: &[],
+///     settled_s: 0.0,
+///     nis: &[],
+///     latencies: &[],
+///     latency_note: "",
+///     counters: None,
+/// };
+/// // Every list may be empty: there is a page, and no figure of errors in it.
+/// let built = build(&nothing)?;
+/// assert!(built.html.contains("<h1>Nothing</h1>") && built.summary.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Material<'a> {
     /// The title.
@@ -53,6 +84,33 @@ pub struct Material<'a> {
 }
 
 /// A report with its figures.
+///
+/// ```
+/// use inekf_client::dataset::{Truth, Truth2dRow};
+/// use inekf_client::exchange::truth_table;
+/// use inekf_client::report::{Material, build};
+///
+/// let row = |i: u64| Truth2dRow { stamp_ns: i * 100_000_000, theta_rad: 0.0, p_w_m: [i as f64, 0.0] };
+/// let truth = Truth::Planar((0..20).map(row).collect());
+/// let table = truth_table(&truth).expect("twenty rows");
+/// // The truth as its own estimate: no error, and the figures as files beside the page.
+/// let built = build(&Material {
+///     title: "Perfect",
+///     subtitle: "",
+///     rows: &table.rows,
+///     truth: &truth,
+///     fixes: &[],
+///     settled_s: 0.5,
+///     nis: &[],
+///     latencies: &[],
+///     latency_note: "",
+///     counters: None,
+/// })?;
+/// let summary = built.summary.expect("they have time in common");
+/// assert_eq!((summary.count, summary.distance_max_m), (15, 0.0));
+/// assert!(built.figures.iter().all(|(name, svg)| name.ends_with(".svg") && svg.starts_with("<svg")));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Built {
     /// The page.

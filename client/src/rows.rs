@@ -28,6 +28,18 @@ use crate::table::estimate::triangle_len;
 use crate::table::{EstimateRow, EstimateState};
 
 /// Turns estimates into rows, one row late.
+///
+/// ```
+/// use inekf_client::rows::RowBuilder;
+/// use inekf_shared::message::{ESTIMATE_PROPAGATED, EstimateMessage, EstimateSe2, Zero};
+///
+/// let mut estimate = EstimateSe2::ZERO;
+/// estimate.head.flags = ESTIMATE_PROPAGATED;
+/// let mut rows = RowBuilder::default();
+/// assert!(rows.push(estimate).is_none());
+/// // A row late: the last one comes at the end.
+/// assert_eq!(rows.finish(), Some(estimate));
+/// ```
 #[derive(Clone, Debug)]
 pub struct RowBuilder<E = EstimateSe23> {
     current: Option<E>,
@@ -62,6 +74,16 @@ impl<E: Estimate> RowBuilder<E> {
 }
 
 /// The estimate as a row of the CSV, with the upper triangle of its covariance.
+///
+/// ```
+/// use inekf_client::rows::row;
+/// use inekf_shared::message::{EstimateSe23, Zero};
+///
+/// let mut estimate = EstimateSe23::ZERO;
+/// (estimate.head.stamp_ns, estimate.head.dimension) = (5, 9);
+/// let row = row(&estimate);
+/// assert_eq!((row.stamp_ns, row.covariance.len()), (5, 45));
+/// ```
 pub fn row<E: Estimate>(estimate: &E) -> EstimateRow {
     EstimateRow {
         stamp_ns: estimate.head().stamp_ns,
@@ -71,11 +93,31 @@ pub fn row<E: Estimate>(estimate: &E) -> EstimateRow {
 }
 
 /// The mean.
+///
+/// ```
+/// use inekf_client::rows::state;
+/// use inekf_client::table::Layout;
+/// use inekf_shared::message::{EstimateSe3, Zero};
+///
+/// assert_eq!(state(&EstimateSe3::ZERO).layout(), Layout::Pose);
+/// ```
 pub fn state<E: Estimate>(estimate: &E) -> EstimateState {
     estimate.mean()
 }
 
 /// The part of the covariance that is in use.
+///
+/// ```
+/// use inekf_client::rows::triangle;
+/// use inekf_shared::message::{EstimateSe23, Zero};
+///
+/// // 9 states without biases, 15 with them: n (n + 1) / 2 entries.
+/// let mut estimate = EstimateSe23::ZERO;
+/// for (dimension, entries) in [(9, 45), (15, 120)] {
+///     estimate.head.dimension = dimension;
+///     assert_eq!(triangle(&estimate).len(), entries);
+/// }
+/// ```
 pub fn triangle<E: Estimate>(estimate: &E) -> &[f64] {
     let entries = triangle_len(estimate.head().dimension as usize);
     let covariance = estimate.covariance();

@@ -1,7 +1,7 @@
 //! One client's whole conversation with a daemon: feeding, reading and requesting.
 
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Context, bail};
 use inekf_shared::message::{
@@ -63,6 +63,30 @@ fn require_answer(controller: &mut Controller, instance: &Instance) -> anyhow::R
 }
 
 /// Ports of every kind to one daemon, whose model is that of the estimates `E`.
+///
+/// It is not run here, for it needs a daemon, another process:
+///
+/// ```no_run
+/// use inekf_client::session::Session;
+/// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+/// use inekf_shared::message::EstimateSe23;
+/// use inekf_shared::topic::Instance;
+///
+/// let drive = simulate(Scenario::RoadCircuit, &SimulationOptions::default())?;
+/// let mut session = Session::<EstimateSe23>::open(&Instance::new("car")?)?;
+/// session.set_initial(&drive.meta)?;
+/// let mut count = 0;
+/// let mut take = |_| {
+///     count += 1;
+///     Ok(())
+/// };
+/// for event in drive.events() {
+///     session.send_lossless(&event, &mut take)?;
+/// }
+/// let answer = session.settle(&mut take)?;
+/// assert!(answer.counters.lost == 0 && count >= drive.imu.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Session<E: Estimate = EstimateSe23> {
     feeder: Feeder,
     reader: EstimateReader<E>,
@@ -97,6 +121,20 @@ impl<E: Estimate> Session<E> {
     ///
     /// # Errors
     /// The state is not one of the daemon's model, or the daemon refuses it.
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use inekf_client::dataset::{Event, ImuRow, Meta};
+    /// # use inekf_client::session::Session;
+    /// # use inekf_shared::message::EstimateSe23;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut session = Session::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// # let row = ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+    /// // As `initial` and `P0_diag` of a dataset say; without them the daemon begins as it is configured to.
+    /// session.set_initial(&Meta::default())?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn set_initial(&mut self, meta: &Meta) -> anyhow::Result<()> {
         if let Some(state) = state_vector(meta, E::KIND)? {
             self.controller.set_state(state)?;
@@ -108,6 +146,19 @@ impl<E: Estimate> Session<E> {
     ///
     /// # Errors
     /// It cannot be sent, or no daemon is there to get it.
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use inekf_client::dataset::{Event, ImuRow, Meta};
+    /// # use inekf_client::session::Session;
+    /// # use inekf_shared::message::EstimateSe23;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut session = Session::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// # let row = ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+    /// session.send(&Event::Imu(row))?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn send(&mut self, event: &Event) -> anyhow::Result<()> {
         if self.feeder.send(event)? == 0 {
             bail!("the daemon has gone: it no longer listens");
@@ -120,6 +171,22 @@ impl<E: Estimate> Session<E> {
     ///
     /// # Errors
     /// As [`Session::send`], or the daemon does not answer, or an estimate was lost.
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use inekf_client::dataset::{Event, ImuRow, Meta};
+    /// # use inekf_client::session::Session;
+    /// # use inekf_shared::message::EstimateSe23;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut session = Session::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// # let row = ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+    /// session.send_lossless(&Event::Imu(row), &mut |estimate| {
+    ///     println!("{:?}", estimate.p_w_m);
+    ///     Ok(())
+    /// })?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn send_lossless(
         &mut self,
         event: &Event,
@@ -165,6 +232,25 @@ impl<E: Estimate> Session<E> {
     ///
     /// # Errors
     /// As [`Session::send_lossless`].
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use inekf_client::dataset::{Event, ImuRow, Meta};
+    /// # use inekf_client::session::Session;
+    /// # use inekf_shared::message::EstimateSe23;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut session = Session::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// # let row = ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+    /// session.send(&Event::Imu(row))?;
+    /// let mut came = Vec::new();
+    /// session.settle(&mut |estimate| {
+    ///     came.push(estimate.head.stamp_ns);
+    ///     Ok(())
+    /// })?;
+    /// assert_eq!(came.last(), Some(&5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn settle(
         &mut self,
         take: &mut impl FnMut(E) -> anyhow::Result<()>,
@@ -178,6 +264,22 @@ impl<E: Estimate> Session<E> {
     ///
     /// # Errors
     /// An estimate was lost, or what `take` returns.
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use inekf_client::dataset::{Event, ImuRow, Meta};
+    /// # use inekf_client::session::Session;
+    /// # use inekf_shared::message::EstimateSe23;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut session = Session::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// # let row = ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+    /// session.take_estimates(&mut |estimate| {
+    ///     println!("{:?}", estimate.p_w_m);
+    ///     Ok(())
+    /// })?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn take_estimates(
         &mut self,
         take: &mut impl FnMut(E) -> anyhow::Result<()>,
@@ -195,26 +297,44 @@ impl<E: Estimate> Session<E> {
     ///
     /// # Errors
     /// It has none yet, or does not answer.
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use inekf_client::dataset::{Event, ImuRow, Meta};
+    /// # use inekf_client::session::Session;
+    /// # use inekf_shared::message::EstimateSe23;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut session = Session::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// # let row = ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+    /// // The covariance belongs to the left-invariant error, rotation first.
+    /// println!("{:?}", &session.snapshot()?.covariance[..3]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn snapshot(&mut self) -> anyhow::Result<StateVector> {
         Ok(self.controller.snapshot()?)
-    }
-
-    /// Waits until a daemon's publisher has been found by this session's reader.
-    ///
-    /// # Errors
-    /// None appears within a second.
-    pub fn wait_for_daemon(&mut self) -> anyhow::Result<()> {
-        let started = Instant::now();
-        while self.controller.barrier().is_err() {
-            if started.elapsed() > Duration::from_secs(1) {
-                bail!("the daemon does not answer");
-            }
-        }
-        Ok(())
     }
 }
 
 /// Why there is no estimate, in words.
+///
+/// ```
+/// use inekf_client::session::why_no_estimate;
+/// use inekf_shared::message::{
+///     ControlResponse, REASON_NOT_READY, STATE_WAITING, WAITING_FOR_POSITION, Zero,
+/// };
+///
+/// let mut response = ControlResponse {
+///     state_code: STATE_WAITING,
+///     waiting_for: WAITING_FOR_POSITION,
+///     ..ControlResponse::ZERO
+/// };
+/// response.rejected_by_reason[REASON_NOT_READY as usize] = 3;
+/// assert_eq!(
+///     why_no_estimate(&response),
+///     "the daemon is waiting, waiting for: position; rejected 3 (not ready)"
+/// );
+/// ```
 pub fn why_no_estimate(response: &ControlResponse) -> String {
     let mut text = format!("the daemon is {}", state_name(response.state_code));
     if matches!(response.state_code, STATE_WAITING | STATE_ALIGNING) {

@@ -3,6 +3,14 @@
 use rustix::time::{ClockId, clock_gettime};
 
 /// Now, CLOCK_MONOTONIC, nanoseconds since an arbitrary start (the host's boot).
+///
+/// ```
+/// use inekf_shared::clock::monotonic_ns;
+///
+/// // It never runs backwards, whatever happens to the time of day.
+/// let sent_ns = monotonic_ns();
+/// assert!(monotonic_ns() >= sent_ns);
+/// ```
 #[must_use]
 pub fn monotonic_ns() -> u64 {
     let now = clock_gettime(ClockId::Monotonic);

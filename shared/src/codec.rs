@@ -45,6 +45,20 @@ const CONFIG: Configuration<LittleEndian, Fixint, Limit<MAX_PAYLOAD_LEN>> =
         .with_limit::<MAX_PAYLOAD_LEN>();
 
 /// Why a value or a frame was refused.
+///
+/// ```
+/// use inekf_shared::codec::{CodecError, FRAME_CHECKPOINT, decode, encode};
+///
+/// let mut frame = encode(FRAME_CHECKPOINT, &7_u64)?;
+/// // Cut short, and changed on the way: two faults of two names.
+/// assert!(matches!(
+///     decode::<u64>(FRAME_CHECKPOINT, &frame[..30]),
+///     Err(CodecError::TooShort { found: 30, needed: 32 })
+/// ));
+/// frame[25] ^= 1;
+/// assert!(matches!(decode::<u64>(FRAME_CHECKPOINT, &frame), Err(CodecError::Damaged { .. })));
+/// # Ok::<(), CodecError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CodecError {
     /// There are fewer bytes than the header has, or than the header announces.
@@ -110,6 +124,16 @@ pub enum CodecError {
 ///
 /// # Errors
 /// [`CodecError::TooLong`], [`CodecError::Unencodable`].
+///
+/// ```
+/// use inekf_shared::codec::{FRAME_ENTRY, FRAME_HEADER_LEN, FRAME_MAGIC, encode};
+///
+/// let frame = encode(FRAME_ENTRY, &0x0102_0304_u32)?;
+/// assert!(frame.starts_with(&FRAME_MAGIC));
+/// // Of fixed width, little-endian.
+/// assert_eq!(frame[FRAME_HEADER_LEN..], [4, 3, 2, 1]);
+/// # Ok::<(), inekf_shared::codec::CodecError>(())
+/// ```
 pub fn encode<T: Serialize>(kind: u32, value: &T) -> Result<Vec<u8>, CodecError> {
     let mut frame = vec![0; FRAME_HEADER_LEN];
     bincode::serde::encode_into_std_write(value, &mut frame, CONFIG).map_err(|error| {
@@ -135,6 +159,17 @@ pub fn encode<T: Serialize>(kind: u32, value: &T) -> Result<Vec<u8>, CodecError>
 ///
 /// # Errors
 /// [`CodecError::Trailing`] if bytes follow the frame, else as [`decode_prefix`].
+///
+/// ```
+/// use inekf_shared::codec::{CodecError, FRAME_CHECKPOINT, FRAME_ENTRY, decode, encode};
+///
+/// let frame = encode(FRAME_CHECKPOINT, &[0.1_f64, f64::MIN_POSITIVE])?;
+/// // Bit for bit.
+/// assert_eq!(decode::<[f64; 2]>(FRAME_CHECKPOINT, &frame)?, [0.1, f64::MIN_POSITIVE]);
+/// // A frame of another kind is not taken for one of this.
+/// assert!(matches!(decode::<[f64; 2]>(FRAME_ENTRY, &frame), Err(CodecError::WrongKind { .. })));
+/// # Ok::<(), CodecError>(())
+/// ```
 pub fn decode<T: DeserializeOwned>(kind: u32, bytes: &[u8]) -> Result<T, CodecError> {
     let (value, len) = decode_prefix(kind, bytes)?;
     match bytes.len() - len {
@@ -148,6 +183,18 @@ pub fn decode<T: DeserializeOwned>(kind: u32, bytes: &[u8]) -> Result<T, CodecEr
 ///
 /// # Errors
 /// A [`CodecError`] that names the cause.
+///
+/// ```
+/// use inekf_shared::codec::{FRAME_ENTRY, decode_prefix, encode};
+///
+/// let mut file = encode(FRAME_ENTRY, &1_u8)?;
+/// file.extend(encode(FRAME_ENTRY, &2_u8)?);
+/// // A file of many frames, front to back.
+/// let (first, len) = decode_prefix::<u8>(FRAME_ENTRY, &file)?;
+/// let (second, _) = decode_prefix::<u8>(FRAME_ENTRY, &file[len..])?;
+/// assert_eq!((first, second), (1, 2));
+/// # Ok::<(), inekf_shared::codec::CodecError>(())
+/// ```
 pub fn decode_prefix<T: DeserializeOwned>(
     kind: u32,
     bytes: &[u8],
@@ -174,6 +221,14 @@ pub fn decode_prefix<T: DeserializeOwned>(
 ///
 /// # Errors
 /// A [`CodecError`] that names the cause.
+///
+/// ```
+/// use inekf_shared::codec::{CodecError, FRAME_ESTIMATE, encode, kind};
+///
+/// assert_eq!(kind(&encode(FRAME_ESTIMATE, &1_u8)?)?, FRAME_ESTIMATE);
+/// assert_eq!(kind(b"t_ns,x,y,z"), Err(CodecError::WrongMagic));
+/// # Ok::<(), CodecError>(())
+/// ```
 pub fn kind(bytes: &[u8]) -> Result<u32, CodecError> {
     Ok(split(bytes)?.0)
 }

@@ -16,6 +16,14 @@ pub const MAX_LOANED: usize = 4;
 pub const MAX_BORROWED: usize = 8;
 
 /// Limits of a publish-subscribe topic.
+///
+/// ```
+/// use inekf_shared::qos::{ESTIMATE, HEALTH};
+///
+/// // A reader of estimates may be away for a second at 1 kHz; a late one of health gets the last at once.
+/// assert!(ESTIMATE.buffer >= 1000 && ESTIMATE.history == 0);
+/// assert_eq!(HEALTH.history, 1);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PubSubQos {
     /// Messages that wait for a subscriber; one more drops the oldest.
@@ -77,6 +85,15 @@ pub const JOURNAL: PubSubQos = PubSubQos {
 };
 
 /// Limits of the publish-subscribe topic `topic`; `None` for a topic of another kind.
+///
+/// ```
+/// use inekf_shared::qos::{PROPAGATION, pub_sub};
+/// use inekf_shared::topic::Topic;
+///
+/// assert_eq!(pub_sub(Topic::Imu), Some(PROPAGATION));
+/// // The newest estimate is a blackboard and no queue.
+/// assert_eq!(pub_sub(Topic::Latest), None);
+/// ```
 #[must_use]
 pub const fn pub_sub(topic: Topic) -> Option<PubSubQos> {
     match topic {

@@ -11,10 +11,26 @@ pub const INSTANCE_MAX_LEN: usize = 64;
 ///
 /// The characters make it safe as one component of a service name and of a file name: it holds no separator and no
 /// dot, so it cannot leave a directory.
+///
+/// ```
+/// use inekf_shared::topic::{Instance, Topic};
+///
+/// let car: Instance = "car-7".parse()?;
+/// assert_eq!(Topic::Estimate.service_name(&car), "inekf/car-7/estimate");
+/// assert_eq!(Instance::default().as_str(), "default");
+/// # Ok::<(), inekf_shared::topic::InstanceError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Instance(String);
 
 /// A refused name of an instance.
+///
+/// ```
+/// use inekf_shared::topic::Instance;
+///
+/// let error = Instance::new("../car").expect_err("it would leave its folder");
+/// assert!(error.to_string().starts_with("instance name \"../car\" contains '.'"));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "instance name {name:?} {fault}; an instance name has 1 to {INSTANCE_MAX_LEN} characters out of A-Z, a-z, 0-9, \
@@ -27,6 +43,15 @@ pub struct InstanceError {
 
 impl Instance {
     /// Checks a name. The error says what is wrong with it and what is allowed.
+    ///
+    /// ```
+    /// use inekf_shared::topic::{INSTANCE_MAX_LEN, Instance};
+    ///
+    /// assert!(Instance::new("a").is_ok());
+    /// for refused in ["", "two words", "a/b", &"a".repeat(INSTANCE_MAX_LEN + 1)] {
+    ///     assert!(Instance::new(refused).is_err());
+    /// }
+    /// ```
     pub fn new(name: &str) -> Result<Self, InstanceError> {
         let refuse = |fault: String| InstanceError {
             name: name.to_owned(),
@@ -74,6 +99,16 @@ impl FromStr for Instance {
 }
 
 /// What is said on one service of an instance.
+///
+/// ```
+/// use inekf_shared::topic::{Instance, Topic};
+///
+/// let instance = Instance::default();
+/// let mut names: Vec<String> = Topic::ALL.iter().map(|topic| topic.service_name(&instance)).collect();
+/// names.sort();
+/// names.dedup();
+/// assert_eq!(names.len(), Topic::ALL.len());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Topic {
     /// Inertial samples, clients to daemon.
@@ -144,6 +179,12 @@ impl Topic {
     }
 
     /// The name of the service: `inekf/<instance>/<topic>`.
+    ///
+    /// ```
+    /// use inekf_shared::topic::{Instance, Topic};
+    ///
+    /// assert_eq!(Topic::Wake.service_name(&Instance::default()), "inekf/default/wake");
+    /// ```
     #[must_use]
     pub fn service_name(self, instance: &Instance) -> String {
         format!("inekf/{instance}/{}", self.name())

@@ -2,8 +2,9 @@
 //
 //     reader [INSTANCE [COUNT]]
 //
-// Not tried yet: the bindings 0.10 are in no package registry, and the test that runs this skips where ICEORYX2_CXX does
-// not name them. The library inekf-c (client/c) does the same from C and C++, and is run by the tests.
+// The bindings 0.10 are in no package registry: they are built from iceoryx2's sources, as its documentation says. The test
+// that runs this skips, and says so, where ICEORYX2_CXX does not name the folder that they are installed in. The library
+// inekf-c (client/c) does the same from C and C++, and is always run by the tests.
 //
 // Units SI; world east-north-up. The payload is read where it lies in shared memory: nothing is copied.
 

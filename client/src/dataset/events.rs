@@ -10,6 +10,16 @@ use super::{
 use crate::model::Model;
 
 /// One row of any kind.
+///
+/// ```
+/// use inekf_client::dataset::{Event, HeadingRow, ImuRow};
+///
+/// let sample = Event::Imu(ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] });
+/// let fix = Event::Heading(HeadingRow { stamp_ns: 5, source: 0, heading_rad: 0.1, sigma_rad: 0.02 });
+/// // The sample moves the state, the fix corrects it, at the same time.
+/// assert!(sample.is_motion() && !fix.is_motion());
+/// assert_eq!(sample.stamp_ns(), fix.stamp_ns());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A position fix.
@@ -40,6 +50,13 @@ impl Event {
     }
 
     /// Whether it moves the state (IMU, odometry) rather than corrects it.
+    ///
+    /// ```
+    /// use inekf_client::dataset::{Event, Odometry2dRow};
+    ///
+    /// let row = Odometry2dRow { stamp_ns: 1, dtheta_rad: 0.0, translation_m: [0.1, 0.0] };
+    /// assert!(Event::Odometry2d(row).is_motion());
+    /// ```
     pub fn is_motion(&self) -> bool {
         matches!(
             self,
@@ -50,6 +67,29 @@ impl Event {
 
 /// Iterator over a dataset's rows in feeding order; made by [`Dataset::events`] and
 /// [`Dataset::events_for`].
+///
+/// ```
+/// use inekf_client::dataset::{Dataset, Event, ImuRow, PositionRow};
+///
+/// let sample = |stamp_ns| ImuRow { stamp_ns, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+/// let drive = Dataset {
+///     imu: vec![sample(10), sample(20)],
+///     position: vec![PositionRow {
+///         stamp_ns: 20,
+///         source: 0,
+///         dimension: 3,
+///         position_w_m: [0.0; 3],
+///         sigma_m: [1.0; 3],
+///     }],
+///     ..Dataset::default()
+/// };
+/// // It knows how many are left; the fix comes before the sample that reaches its stamp.
+/// let mut events = drive.events();
+/// assert_eq!(events.len(), 3);
+/// assert_eq!(events.next().map(|event| event.stamp_ns()), Some(10));
+/// assert!(matches!(events.next(), Some(Event::Position(_))));
+/// assert!(matches!(events.next(), Some(Event::Imu(_))));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Events<'a> {
     position: &'a [PositionRow],

@@ -9,6 +9,17 @@ use super::{Dataset, Odometry};
 use crate::model::Model;
 
 /// Why a daemon's model cannot be fed with a dataset. `Display` is one line.
+///
+/// ```
+/// use inekf_client::dataset::{Dataset, Unfit};
+/// use inekf_client::model::Model;
+///
+/// let empty = Dataset::default();
+/// let unfit = empty.events_for(Model::Imu).expect_err("it has no samples");
+/// assert!(matches!(unfit, Unfit::NoMotion { file: "imu.csv", .. }));
+/// // One line, with the remedy.
+/// assert!(unfit.to_string().ends_with("add it"));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unfit {
     /// The samples that move the state are missing.
@@ -44,6 +55,23 @@ impl Dataset {
     /// # Errors
     /// [`Unfit`] if the samples that move the state are missing, or a fix has fewer dimensions than the model. A fix
     /// with more is sent as it is: a planar daemon leaves z aside.
+    ///
+    /// ```
+    /// use inekf_client::dataset::Event;
+    /// use inekf_client::model::Model;
+    /// use inekf_client::simulate::{Scenario, SimulationOptions, VelocityOptions, simulate};
+    ///
+    /// let options = SimulationOptions {
+    ///     duration_s: 1.0,
+    ///     velocity: Some(VelocityOptions::default()),
+    ///     ..SimulationOptions::default()
+    /// };
+    /// let drive = simulate(Scenario::RoadCircuit, &options)?;
+    /// assert_eq!(drive.events_for(Model::Imu)?.len(), drive.events().len());
+    /// // There is no wheel to drive an odometry model with.
+    /// assert!(drive.events_for(Model::Odometry2d).is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn events_for(&self, model: Model) -> Result<Events<'_>, Unfit> {
         if !self.models().contains(&model) {
             return Err(self.no_motion(model));
@@ -61,6 +89,15 @@ impl Dataset {
     }
 
     /// The models whose state this dataset can move.
+    ///
+    /// ```
+    /// use inekf_client::model::Model;
+    /// use inekf_client::simulate::{PlanarOptions, simulate_planar};
+    ///
+    /// let drive = simulate_planar(&PlanarOptions { duration_s: 1.0, ..PlanarOptions::default() })?;
+    /// assert_eq!(drive.models(), [Model::Odometry2d]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn models(&self) -> Vec<Model> {
         let odometry = match &self.odometry {
             Odometry::Planar(rows) if !rows.is_empty() => Some(Model::Odometry2d),

@@ -16,6 +16,14 @@ use crate::table::{Fault, Faults};
 
 /// The file names to read, for folders that hold alternatives (`position_noisy.csv`,
 /// `reference.csv`).
+///
+/// ```
+/// use inekf_client::dataset::LoadOptions;
+///
+/// // A folder that holds noisier fixes beside the good ones.
+/// let noisy = LoadOptions { position_file: "position_noisy.csv".to_owned(), ..LoadOptions::default() };
+/// assert_eq!(noisy.truth_file, "truth.csv");
+/// ```
 #[derive(Clone, Debug)]
 pub struct LoadOptions {
     /// Position fixes; default `position.csv`.

@@ -20,6 +20,19 @@ use crate::table::{Fault, Faults};
 const FILE: &str = "meta.json";
 
 /// Densities of the IMU's noise.
+///
+/// ```
+/// use inekf_client::dataset::Meta;
+/// use inekf_client::table::Faults;
+///
+/// let mut faults = Faults::new();
+/// let meta = Meta::parse(r#"{ "imu_noise": { "gyro_nd": 1e-4, "accel_nd": 2e-3 } }"#, &mut faults);
+/// let noise = meta.imu_noise.expect("it is there");
+/// // White noise of a sample is its density by the root of the rate: at 100 Hz 1e-3 rad/s.
+/// assert!((noise.gyro_density * 100_f64.sqrt() - 1e-3).abs() < 1e-15);
+/// // What is not given is zero.
+/// assert_eq!(noise.gyro_bias_walk, 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImuNoise {
     /// White noise of the gyro, rad/s/sqrt(Hz).
@@ -33,6 +46,17 @@ pub struct ImuNoise {
 }
 
 /// The state to start from.
+///
+/// ```
+/// use inekf_client::dataset::{Initial, Meta};
+/// use inekf_client::table::Faults;
+///
+/// let text = r#"{ "initial": { "t_ns": 5, "theta": 0.5, "x": 1.0, "y": 2.0 }, "P0_diag": [0.01, 9, 9] }"#;
+/// let mut faults = Faults::new();
+/// let initial = Meta::parse(text, &mut faults).initial;
+/// assert_eq!(initial, Some(Initial::Planar { stamp_ns: 5, theta_rad: 0.5, p_w_m: [1.0, 2.0] }));
+/// assert!(faults.is_empty());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Initial {
     /// In the plane.
@@ -62,6 +86,17 @@ pub enum Initial {
 }
 
 /// What is known about a recording; see the module's table of keys.
+///
+/// ```
+/// use inekf_client::dataset::Meta;
+/// use inekf_client::table::Faults;
+///
+/// let mut faults = Faults::new();
+/// let meta = Meta::parse(r#"{ "name": "lap", "gravity": 9.81, "driver": "Anna" }"#, &mut faults);
+/// assert_eq!((meta.name.as_str(), meta.gravity_mps2), ("lap", Some(9.81)));
+/// // A key that means nothing here is kept, and written back.
+/// assert!(meta.to_json().contains("\"driver\": \"Anna\""));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Meta {
     /// Name of the dataset.
@@ -85,6 +120,17 @@ pub struct Meta {
 
 impl Meta {
     /// The lever arm of a position source, m, body FLU; zero if none is known.
+    ///
+    /// ```
+    /// use inekf_client::dataset::Meta;
+    ///
+    /// let mut meta = Meta { lever_arms_m: vec![[0.5, 0.0, 1.0]], ..Meta::default() };
+    /// // One alone stands for every source.
+    /// assert_eq!(meta.lever_arm_m(3), [0.5, 0.0, 1.0]);
+    /// meta.lever_arms_m.push([-0.5, 0.0, 1.0]);
+    /// assert_eq!(meta.lever_arm_m(1), [-0.5, 0.0, 1.0]);
+    /// assert_eq!(meta.lever_arm_m(2), [0.0; 3]);
+    /// ```
     pub fn lever_arm_m(&self, source: u32) -> [f64; 3] {
         match self.lever_arms_m.as_slice() {
             [only] => *only,
@@ -97,6 +143,17 @@ impl Meta {
     }
 
     /// Reads the text of a `meta.json`; faults are added to `faults`.
+    ///
+    /// ```
+    /// use inekf_client::dataset::Meta;
+    /// use inekf_client::table::Faults;
+    ///
+    /// // Every fault is told, each with its key and remedy.
+    /// let mut faults = Faults::new();
+    /// Meta::parse(r#"{ "gravity": -9.81, "P0_diag": [1, 2] }"#, &mut faults);
+    /// assert_eq!(faults.len(), 2);
+    /// assert!(faults.list()[0].to_string().starts_with("meta.json gravity: -9.81 is not a magnitude"));
+    /// ```
     pub fn parse(text: &str, faults: &mut Faults) -> Self {
         let mut other = match serde_json::from_str::<Value>(text) {
             Ok(Value::Object(map)) => map,
@@ -133,6 +190,15 @@ impl Meta {
     }
 
     /// The text of a `meta.json`, keys sorted, every double exact.
+    ///
+    /// ```
+    /// use inekf_client::dataset::Meta;
+    /// use inekf_client::table::Faults;
+    ///
+    /// let meta = Meta { name: "lap".to_owned(), gravity_mps2: Some(9.80665), ..Meta::default() };
+    /// let mut faults = Faults::new();
+    /// assert_eq!(Meta::parse(&meta.to_json(), &mut faults), meta);
+    /// ```
     pub fn to_json(&self) -> String {
         let mut map = self.other.clone();
         map.insert("name".to_owned(), json!(self.name));

@@ -56,6 +56,15 @@ use crate::table::Faults;
 
 /// A dataset in memory. Every list is sorted by stamp, fixes with one stamp by source; loading and
 /// simulating guarantee it, and [`Dataset::sort`] restores it after changes by hand.
+///
+/// ```
+/// use inekf_client::dataset::{Dataset, ImuRow};
+///
+/// let sample = |stamp_ns| ImuRow { stamp_ns, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+/// let mut drive = Dataset { imu: vec![sample(20), sample(10)], ..Dataset::default() };
+/// drive.sort();
+/// assert_eq!(drive.events().map(|event| event.stamp_ns()).collect::<Vec<_>>(), [10, 20]);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Dataset {
     /// What is known about the recording.
@@ -75,6 +84,16 @@ pub struct Dataset {
 }
 
 /// Odometry rows, in the plane or in space.
+///
+/// ```
+/// use inekf_client::dataset::{Dataset, Odometry, Odometry2dRow};
+/// use inekf_client::model::Model;
+///
+/// let row = Odometry2dRow { stamp_ns: 1, dtheta_rad: 0.1, translation_m: [1.0, 0.0] };
+/// let planar = Dataset { odometry: Odometry::Planar(vec![row]), ..Dataset::default() };
+/// assert_eq!(planar.models(), [Model::Odometry2d]);
+/// assert_eq!(Dataset::default().odometry, Odometry::None);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Odometry {
     /// The dataset has none.
@@ -87,6 +106,15 @@ pub enum Odometry {
 }
 
 /// Truth rows, in the plane or in space.
+///
+/// ```
+/// use inekf_client::dataset::{Truth, Truth2dRow};
+/// use inekf_client::evaluate::Trajectory;
+///
+/// let truth = Truth::Planar(vec![Truth2dRow { stamp_ns: 3, theta_rad: 1.0, p_w_m: [2.0, 0.0] }]);
+/// let trajectory = Trajectory::from_truth(&truth);
+/// assert!((trajectory.poses()[0].heading_rad() - 1.0).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Truth {
     /// The dataset has none.
@@ -100,6 +128,15 @@ pub enum Truth {
 
 impl Dataset {
     /// Sorts every list by stamp, and fixes with one stamp by source.
+    ///
+    /// ```
+    /// use inekf_client::dataset::{Dataset, HeadingRow};
+    ///
+    /// let fix = |stamp_ns, source| HeadingRow { stamp_ns, source, heading_rad: 0.0, sigma_rad: 0.1 };
+    /// let mut drive = Dataset { heading: vec![fix(5, 1), fix(5, 0), fix(2, 1)], ..Dataset::default() };
+    /// drive.sort();
+    /// assert_eq!(drive.heading, [fix(2, 1), fix(5, 0), fix(5, 1)]);
+    /// ```
     pub fn sort(&mut self) {
         self.imu.sort_by_key(|row| row.stamp_ns);
         match &mut self.odometry {
@@ -121,12 +158,37 @@ impl Dataset {
     /// position (by source), then velocity, then heading, then the IMU sample, then odometry, so
     /// that a fix is there when the sample that reaches its stamp arrives. A daemon of one model
     /// takes [`Dataset::events_for`] that model.
+    ///
+    /// ```
+    /// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+    ///
+    /// let options = SimulationOptions { duration_s: 1.0, ..SimulationOptions::default() };
+    /// let drive = simulate(Scenario::RoadCircuit, &options)?;
+    /// // Each row once, in the order of time.
+    /// let stamps_ns: Vec<u64> = drive.events().map(|event| event.stamp_ns()).collect();
+    /// assert_eq!(stamps_ns.len(), drive.imu.len() + drive.position.len());
+    /// assert!(stamps_ns.is_sorted());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn events(&self) -> Events<'_> {
         Events::new(self)
     }
 }
 
 /// Why a dataset folder could not be read or written. `Display` is one line.
+///
+/// ```
+/// use inekf_client::dataset::{Dataset, DatasetError};
+///
+/// let folder = tempfile::tempdir()?;
+/// std::fs::write(folder.path().join("imu.csv"), "t_ns,gx,gy,gz,ax,ay,az\n0,0,0,x,0,0,9.8\n")?;
+/// // The fault names the file, the line and the column.
+/// let Err(DatasetError::Faults { faults, .. }) = Dataset::load(folder.path()) else {
+///     panic!("x is no number")
+/// };
+/// assert!(faults.to_string().starts_with("imu.csv line 2 gz: "));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// The folder is not there or cannot be read.

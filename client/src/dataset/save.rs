@@ -16,6 +16,24 @@ impl Dataset {
     ///
     /// # Errors
     /// [`DatasetError::File`] with the file that could not be written.
+    ///
+    /// ```
+    /// use inekf_client::dataset::{Dataset, HeadingRow, ImuRow};
+    ///
+    /// let mut drive = Dataset {
+    ///     imu: vec![ImuRow { stamp_ns: 1, gyro_rps: [0.1, 0.0, 0.0], accel_mps2: [0.0, 0.0, 9.8] }],
+    ///     heading: vec![HeadingRow { stamp_ns: 1, source: 0, heading_rad: 0.3, sigma_rad: 0.1 }],
+    ///     ..Dataset::default()
+    /// };
+    /// let folder = tempfile::tempdir()?;
+    /// drive.save(folder.path())?;
+    /// // A folder holds one dataset and no mixture: what is there no more has no file.
+    /// drive.heading.clear();
+    /// drive.save(folder.path())?;
+    /// assert!(!folder.path().join("heading.csv").exists());
+    /// assert_eq!(Dataset::load(folder.path())?, drive);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn save(&self, dir: impl AsRef<Path>) -> Result<(), DatasetError> {
         let dir = dir.as_ref();
         fs::create_dir_all(dir).map_err(|cause| DatasetError::File {
@@ -118,6 +136,17 @@ impl Dataset {
 ///
 /// # Errors
 /// [`DatasetError::File`] with the file that could not be written.
+///
+/// ```
+/// use inekf_client::dataset::{Truth, Truth2dRow, save_truth};
+///
+/// let row = Truth2dRow { stamp_ns: 5, theta_rad: 0.5, p_w_m: [1.0, 2.0] };
+/// let folder = tempfile::tempdir()?;
+/// save_truth(folder.path(), &Truth::Planar(vec![row]))?;
+/// let text = std::fs::read_to_string(folder.path().join("truth.csv"))?;
+/// assert_eq!(text, "t_ns,theta,x,y\n5,0.5,1.0,2.0\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn save_truth(dir: impl AsRef<Path>, truth: &Truth) -> Result<(), DatasetError> {
     let dir = dir.as_ref();
     fs::create_dir_all(dir).map_err(|cause| DatasetError::File {

@@ -16,6 +16,19 @@ use crate::table::EstimateTable;
 ///
 /// # Errors
 /// [`ExportError`]; nothing is written if the stamps do not increase.
+///
+/// ```
+/// use inekf_client::exchange::flat;
+/// use inekf_client::table::read_estimates;
+///
+/// let table = read_estimates("estimate.csv", &b"t_ns,theta,x,y\n1500000000,0.0,1.0,2.0\n"[..])?;
+/// let mut text = Vec::new();
+/// flat::write(&table, &mut text)?;
+/// let text = String::from_utf8(text)?;
+/// assert_eq!(text.lines().next(), Some("t_s,x,y,z,roll_deg,pitch_deg,yaw_deg"));
+/// assert!(text.contains("\n1.500000000,1.000000,2.000000,"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write(table: &EstimateTable, out: &mut impl Write) -> Result<(), ExportError> {
     require_sorted(&table.rows)?;
     let with_velocity = table

@@ -46,6 +46,20 @@ const TRANSFORM: &str = "geometry_msgs/Vector3 translation\ngeometry_msgs/Quater
 ///
 /// # Errors
 /// [`ExportError`]; nothing is written if the stamps do not increase.
+///
+/// ```
+/// use std::io::Cursor;
+///
+/// use inekf_client::exchange::mcap;
+/// use inekf_client::table::read_estimates;
+///
+/// let table = read_estimates("estimate.csv", &b"t_ns,theta,x,y\n1500000000,0.0,1.0,2.0\n"[..])?;
+/// let mut file = Cursor::new(Vec::new());
+/// mcap::write(&table.rows, &mut file)?;
+/// // The format's magic bytes, at both ends.
+/// assert!(file.get_ref().starts_with(b"\x89MCAP0\r\n") && file.get_ref().ends_with(b"\x89MCAP0\r\n"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write(rows: &[EstimateRow], out: impl Write + Seek) -> Result<(), ExportError> {
     require_sorted(rows)?;
     let options = WriteOptions::new()

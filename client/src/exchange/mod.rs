@@ -40,6 +40,14 @@ use crate::dataset::{Truth, TruthRow};
 use crate::table::{EstimateRow, EstimateState, EstimateTable, Layout};
 
 /// Estimates could not be exported.
+///
+/// ```
+/// use inekf_client::exchange::{ExportError, require_sorted};
+///
+/// let error = require_sorted(&[]).expect_err("nothing to export");
+/// assert!(matches!(error, ExportError::Empty));
+/// assert_eq!(error.to_string(), "there are no estimates to export");
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// Stamps do not increase.
@@ -74,6 +82,21 @@ pub enum ExportError {
 ///
 /// # Errors
 /// [`ExportError::Unsorted`], [`ExportError::Empty`].
+///
+/// ```
+/// use inekf_client::exchange::{ExportError, require_sorted};
+/// use inekf_client::table::{EstimateRow, EstimateState};
+///
+/// let row = |stamp_ns| EstimateRow {
+///     stamp_ns,
+///     state: EstimateState::Plane { theta_rad: 0.0, p_w_m: [0.0; 2] },
+///     covariance: vec![],
+/// };
+/// assert!(require_sorted(&[row(1), row(2)]).is_ok());
+/// // Twice the same stamp is refused as well.
+/// let refused = require_sorted(&[row(1), row(2), row(2)]);
+/// assert!(matches!(refused, Err(ExportError::Unsorted { stamp_ns: 2, before_ns: 2 })));
+/// ```
 pub fn require_sorted(rows: &[EstimateRow]) -> Result<(), ExportError> {
     if rows.is_empty() {
         return Err(ExportError::Empty);
@@ -91,6 +114,19 @@ pub fn require_sorted(rows: &[EstimateRow]) -> Result<(), ExportError> {
 }
 
 /// A truth as a table of estimates without covariance, so that it can be exported beside them. `None` if it has no rows.
+///
+/// ```
+/// use inekf_client::dataset::{Truth, Truth2dRow};
+/// use inekf_client::exchange::{truth_table, tum};
+///
+/// let truth = Truth::Planar(vec![Truth2dRow { stamp_ns: 0, theta_rad: 0.0, p_w_m: [4.0, 5.0] }]);
+/// let table = truth_table(&truth).expect("it has rows");
+/// let mut text = Vec::new();
+/// tum::write(&table.rows, &mut text)?;
+/// assert_eq!(text, b"0.000000000 4.0 5.0 0.0 0.0 0.0 0.0 1.0\n");
+/// assert!(truth_table(&Truth::None).is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn truth_table(truth: &Truth) -> Option<EstimateTable> {
     let (layout, rows): (Layout, Vec<EstimateRow>) = match truth {

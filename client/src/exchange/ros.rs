@@ -20,6 +20,21 @@ use crate::table::{EstimateRow, EstimateState};
 pub const UNKNOWN: f64 = 1e9;
 
 /// What a `nav_msgs/Odometry` holds.
+///
+/// ```
+/// use inekf_client::exchange::ros::Odometry;
+/// use inekf_client::table::{EstimateRow, EstimateState};
+///
+/// // Ours is rotation first, in the body; ROS has x, y, z first, in the world.
+/// let north = EstimateState::Pose {
+///     q_wb: [0.0, 0.0, 0.5_f64.sqrt(), 0.5_f64.sqrt()],
+///     p_w_m: [0.0; 3],
+/// };
+/// let mut covariance = vec![0.0; 21];
+/// covariance[15] = 4.0; // (3, 3): 2 m along the body's x axis
+/// let ros = Odometry::from_row(&EstimateRow { stamp_ns: 0, state: north, covariance });
+/// assert!((ros.pose_covariance[(1, 1)] - 4.0).abs() < 1e-12 && ros.pose_covariance[(0, 0)] < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Odometry {
     /// Stamp, pose in the world, velocity in the world.
@@ -34,6 +49,28 @@ pub struct Odometry {
 
 impl Odometry {
     /// The row in ROS's conventions.
+    ///
+    /// ```
+    /// use inekf_client::exchange::ros::{Odometry, UNKNOWN};
+    /// use inekf_client::table::{EstimateRow, EstimateState};
+    ///
+    /// // Northwards at 3 m/s, facing north: 3 m/s forwards.
+    /// let row = EstimateRow {
+    ///     stamp_ns: 0,
+    ///     state: EstimateState::Navigation {
+    ///         q_wb: [0.0, 0.0, 0.5_f64.sqrt(), 0.5_f64.sqrt()],
+    ///         v_w_mps: [0.0, 3.0, 0.0],
+    ///         p_w_m: [0.0; 3],
+    ///         gyro_bias_rps: [0.0; 3],
+    ///         accel_bias_mps2: [0.0; 3],
+    ///     },
+    ///     covariance: vec![],
+    /// };
+    /// let ros = Odometry::from_row(&row);
+    /// assert!((ros.v_b_mps.x - 3.0).abs() < 1e-12 && ros.v_b_mps.y.abs() < 1e-12);
+    /// // The angular velocity is not a part of the state.
+    /// assert_eq!(ros.twist_covariance[(5, 5)], UNKNOWN);
+    /// ```
     #[must_use]
     pub fn from_row(row: &EstimateRow) -> Self {
         let pose = estimate_pose(row.stamp_ns, &row.state);

@@ -13,6 +13,18 @@ use crate::table::EstimateRow;
 ///
 /// # Errors
 /// [`ExportError`]; nothing is written if the stamps do not increase.
+///
+/// ```
+/// use inekf_client::exchange::tum;
+/// use inekf_client::table::read_estimates;
+///
+/// // A north-going pose: the quaternion of a quarter turn about z, x y z w.
+/// let csv = b"t_ns,theta,x,y\n2000000001,1.5707963267948966,1.0,2.0\n";
+/// let mut text = Vec::new();
+/// tum::write(&read_estimates("estimate.csv", &csv[..])?.rows, &mut text)?;
+/// assert!(text.starts_with(b"2.000000001 1.0 2.0 0.0 0.0 0.0 0.7071067811865"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn write(rows: &[EstimateRow], out: &mut impl Write) -> Result<(), ExportError> {
     require_sorted(rows)?;
     for row in rows {
@@ -35,6 +47,13 @@ pub fn write(rows: &[EstimateRow], out: &mut impl Write) -> Result<(), ExportErr
 }
 
 /// Nanoseconds, shown as seconds with nine decimals.
+///
+/// ```
+/// use inekf_client::exchange::tum::Seconds;
+///
+/// // A double has no room for the nanoseconds of this century; text has.
+/// assert_eq!(Seconds(1_700_000_000_000_000_007).to_string(), "1700000000.000000007");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seconds(pub u64);
 

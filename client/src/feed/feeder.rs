@@ -34,6 +34,13 @@ use crate::dataset::{
 const NODE: &str = "inekf-feeder";
 
 /// A sample could not be sent.
+///
+/// ```
+/// use inekf_client::feed::SendError;
+///
+/// let error = SendError { topic: "imu", cause: "LoanError::OutOfMemory".to_owned() };
+/// assert!(error.to_string().starts_with("sending on the topic imu: "));
+/// ```
 #[derive(Debug, thiserror::Error)]
 #[error("sending on the topic {topic}: {cause}; is there space in /dev/shm?")]
 pub struct SendError {
@@ -49,6 +56,33 @@ pub struct SendError {
 /// Sending never waits. If somebody removes the files in shared memory the feeder attaches anew by itself, within half a
 /// second and at the cost of one send that takes as long as opening did; what was sent to nobody meanwhile is lost, and
 /// the daemon counts it.
+///
+/// ```
+/// use inekf_client::dataset::ImuRow;
+/// use inekf_client::feed::Feeder;
+/// use inekf_shared::message::ImuSample;
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = || transport::open_node_with("doc", &config);
+/// let instance = Instance::new("car")?;
+/// // What a daemon does:
+/// let daemon = node()?;
+/// let inputs = transport::input::<ImuSample>(&daemon, &instance)?.subscriber()?;
+/// // What a sensor's process does:
+/// let mut feeder = Feeder::open_on(node()?, &instance)?;
+/// let row = ImuRow { stamp_ns: 5_000_000, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+/// assert_eq!((feeder.imu(&row)?, feeder.imu(&row)?), (1, 1));
+/// // Numbered, and of one life of the sender.
+/// let (first, second) = (inputs.receive()?.expect("sent"), inputs.receive()?.expect("sent"));
+/// assert_eq!((first.header.seq, second.header.seq), (0, 1));
+/// assert_eq!(first.header.epoch, second.header.epoch);
+/// assert_eq!(first.header.stamp_ns, 5_000_000);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Feeder {
     ports: Attached<Ports>,
     numbering: Numbering,
@@ -109,6 +143,23 @@ impl Feeder {
     ///
     /// # Errors
     /// [`SendError`].
+    ///
+    /// ```
+    /// use inekf_client::dataset::{Event, HeadingRow};
+    /// use inekf_client::feed::Feeder;
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// let mut feeder = Feeder::open_on(node()?, &Instance::new("car")?)?;
+    /// let row = HeadingRow { stamp_ns: 5, source: 0, heading_rad: 0.3, sigma_rad: 0.1 };
+    /// // No daemon listens: nobody gets it, and that is no error.
+    /// assert_eq!(feeder.send(&Event::Heading(row))?, 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn send(&mut self, event: &Event) -> Result<usize, SendError> {
         match event {
             Event::Imu(row) => self.imu(row),
@@ -124,6 +175,25 @@ impl Feeder {
     ///
     /// # Errors
     /// [`SendError`].
+    ///
+    /// ```
+    /// # use inekf_client::dataset::ImuRow;
+    /// # use inekf_client::feed::Feeder;
+    /// # use inekf_shared::message::ImuSample;
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let (instance, daemon) = (Instance::new("car")?, node()?);
+    /// # let inputs = transport::input::<ImuSample>(&daemon, &instance)?.subscriber()?;
+    /// # let mut feeder = Feeder::open_on(node()?, &instance)?;
+    /// let row = ImuRow { stamp_ns: 5, gyro_rps: [0.0, 0.0, 0.1], accel_mps2: [0.0, 0.0, 9.81] };
+    /// assert_eq!(feeder.imu(&row)?, 1);
+    /// assert_eq!(inputs.receive()?.expect("sent").gyro_rps, row.gyro_rps);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn imu(&mut self, row: &ImuRow) -> Result<usize, SendError> {
         let message = self.numbering.imu(row, monotonic_ns());
         send(&mut self.ports, |ports| &mut ports.imu, &message, "imu")
@@ -133,6 +203,25 @@ impl Feeder {
     ///
     /// # Errors
     /// [`SendError`].
+    ///
+    /// ```
+    /// # use inekf_client::dataset::Odometry2dRow;
+    /// # use inekf_client::feed::Feeder;
+    /// # use inekf_shared::message::Odometry2d;
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let (instance, daemon) = (Instance::new("car")?, node()?);
+    /// # let inputs = transport::input::<Odometry2d>(&daemon, &instance)?.subscriber()?;
+    /// # let mut feeder = Feeder::open_on(node()?, &instance)?;
+    /// let row = Odometry2dRow { stamp_ns: 5, dtheta_rad: 0.01, translation_m: [0.1, 0.0] };
+    /// assert_eq!(feeder.odometry2d(&row)?, 1);
+    /// assert_eq!(inputs.receive()?.expect("sent").translation_m, [0.1, 0.0]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn odometry2d(&mut self, row: &Odometry2dRow) -> Result<usize, SendError> {
         let message = self.numbering.odometry2d(row, monotonic_ns());
         send(
@@ -147,6 +236,25 @@ impl Feeder {
     ///
     /// # Errors
     /// [`SendError`].
+    ///
+    /// ```
+    /// # use inekf_client::dataset::Odometry3dRow;
+    /// # use inekf_client::feed::Feeder;
+    /// # use inekf_shared::message::Odometry3d;
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let (instance, daemon) = (Instance::new("car")?, node()?);
+    /// # let inputs = transport::input::<Odometry3d>(&daemon, &instance)?.subscriber()?;
+    /// # let mut feeder = Feeder::open_on(node()?, &instance)?;
+    /// let row = Odometry3dRow { stamp_ns: 5, rotation_rad: [0.0, 0.0, 0.01], translation_m: [0.1, 0.0, 0.0] };
+    /// assert_eq!(feeder.odometry3d(&row)?, 1);
+    /// assert_eq!(inputs.receive()?.expect("sent").rotation_rad[2], 0.01);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn odometry3d(&mut self, row: &Odometry3dRow) -> Result<usize, SendError> {
         let message = self.numbering.odometry3d(row, monotonic_ns());
         send(
@@ -161,6 +269,32 @@ impl Feeder {
     ///
     /// # Errors
     /// [`SendError`].
+    ///
+    /// ```
+    /// # use inekf_client::dataset::PositionRow;
+    /// # use inekf_client::feed::Feeder;
+    /// # use inekf_shared::message::PositionFix;
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let (instance, daemon) = (Instance::new("car")?, node()?);
+    /// # let inputs = transport::input::<PositionFix>(&daemon, &instance)?.subscriber()?;
+    /// # let mut feeder = Feeder::open_on(node()?, &instance)?;
+    /// let row = PositionRow {
+    ///     stamp_ns: 5,
+    ///     source: 1,
+    ///     dimension: 3,
+    ///     position_w_m: [10.0, 20.0, 1.0],
+    ///     sigma_m: [2.0; 3],
+    /// };
+    /// assert_eq!(feeder.position(&row)?, 1);
+    /// // The deviations cross as a covariance.
+    /// assert_eq!(inputs.receive()?.expect("sent").covariance_w_m2[4], 4.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn position(&mut self, row: &PositionRow) -> Result<usize, SendError> {
         let message = self.numbering.position(row, monotonic_ns());
         send(
@@ -175,6 +309,25 @@ impl Feeder {
     ///
     /// # Errors
     /// [`SendError`].
+    ///
+    /// ```
+    /// # use inekf_client::dataset::VelocityRow;
+    /// # use inekf_client::feed::Feeder;
+    /// # use inekf_shared::message::VelocityFix;
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let (instance, daemon) = (Instance::new("car")?, node()?);
+    /// # let inputs = transport::input::<VelocityFix>(&daemon, &instance)?.subscriber()?;
+    /// # let mut feeder = Feeder::open_on(node()?, &instance)?;
+    /// let row = VelocityRow { stamp_ns: 5, source: 0, velocity_w_mps: [3.0, 0.0, 0.0], sigma_mps: [0.1; 3] };
+    /// assert_eq!(feeder.velocity(&row)?, 1);
+    /// assert_eq!(inputs.receive()?.expect("sent").velocity_w_mps[0], 3.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn velocity(&mut self, row: &VelocityRow) -> Result<usize, SendError> {
         let message = self.numbering.velocity(row, monotonic_ns());
         send(
@@ -189,6 +342,25 @@ impl Feeder {
     ///
     /// # Errors
     /// [`SendError`].
+    ///
+    /// ```
+    /// # use inekf_client::dataset::HeadingRow;
+    /// # use inekf_client::feed::Feeder;
+    /// # use inekf_shared::message::HeadingFix;
+    /// # use inekf_shared::topic::Instance;
+    /// # use inekf_shared::transport;
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let (instance, daemon) = (Instance::new("car")?, node()?);
+    /// # let inputs = transport::input::<HeadingFix>(&daemon, &instance)?.subscriber()?;
+    /// # let mut feeder = Feeder::open_on(node()?, &instance)?;
+    /// let row = HeadingRow { stamp_ns: 5, source: 0, heading_rad: 0.3, sigma_rad: 0.02 };
+    /// assert_eq!(feeder.heading(&row)?, 1);
+    /// assert_eq!(inputs.receive()?.expect("sent").sigma_rad, 0.02);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn heading(&mut self, row: &HeadingRow) -> Result<usize, SendError> {
         let message = self.numbering.heading(row, monotonic_ns());
         send(

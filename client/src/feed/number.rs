@@ -11,6 +11,17 @@ use crate::dataset::{
 };
 
 /// Any input message, numbered and ready to send.
+///
+/// ```
+/// use inekf_client::dataset::{Event, HeadingRow};
+/// use inekf_client::feed::{Input, Numbering};
+///
+/// let row = HeadingRow { stamp_ns: 5, source: 1, heading_rad: 0.3, sigma_rad: 0.1 };
+/// let Input::Heading(fix) = Numbering::new(7).message(&Event::Heading(row), 9) else {
+///     panic!("a heading stays one")
+/// };
+/// assert_eq!((fix.header.stamp_ns, fix.header.sent_ns, fix.header.epoch), (5, 9, 7));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Input {
     /// An IMU sample.
@@ -28,6 +39,19 @@ pub enum Input {
 }
 
 /// Numbers the messages of one sender, topic by topic, so that the daemon can count losses.
+///
+/// ```
+/// use inekf_client::dataset::{HeadingRow, ImuRow};
+/// use inekf_client::feed::Numbering;
+///
+/// let sample = ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+/// let fix = HeadingRow { stamp_ns: 5, source: 0, heading_rad: 0.3, sigma_rad: 0.1 };
+/// let mut numbering = Numbering::new(1);
+/// // Each topic counts for itself: a gap in one is a loss on that one.
+/// assert_eq!(numbering.imu(&sample, 0).header.seq, 0);
+/// assert_eq!(numbering.imu(&sample, 0).header.seq, 1);
+/// assert_eq!(numbering.heading(&fix, 0).header.seq, 0);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Numbering {
     epoch: u64,
@@ -44,6 +68,15 @@ impl Numbering {
     }
 
     /// The message for `event`, sent at `sent_ns` (CLOCK_MONOTONIC).
+    ///
+    /// ```
+    /// use inekf_client::dataset::{Event, ImuRow};
+    /// use inekf_client::feed::{Input, Numbering};
+    ///
+    /// let row = ImuRow { stamp_ns: 5, gyro_rps: [0.1, 0.0, 0.0], accel_mps2: [0.0, 0.0, 9.81] };
+    /// let Input::Imu(sample) = Numbering::new(1).message(&Event::Imu(row), 12) else { unreachable!() };
+    /// assert_eq!((sample.gyro_rps, sample.header.sent_ns), (row.gyro_rps, 12));
+    /// ```
     pub fn message(&mut self, event: &Event, sent_ns: u64) -> Input {
         match event {
             Event::Imu(row) => Input::Imu(self.imu(row, sent_ns)),

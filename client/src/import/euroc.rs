@@ -26,6 +26,23 @@ const POSITION: &str = "timestamp [ns],p_x,p_y,p_z [m]";
 ///
 /// # Errors
 /// [`ImportError`] with file and line. The IMU has to be there, truth and positions need not.
+///
+/// ```
+/// use std::fs;
+///
+/// use inekf_client::import::euroc;
+///
+/// let folder = tempfile::tempdir()?;
+/// let imu = folder.path().join("mav0/imu0");
+/// fs::create_dir_all(&imu)?;
+/// // The sensor's x axis is up: at rest it feels 9.81 there.
+/// fs::write(imu.join("data.csv"), "#timestamp,w_x,w_y,w_z,a_x,a_y,a_z\n5,0.1,0,0,9.81,0,0\n")?;
+/// let drive = euroc::read(folder.path(), 0.01)?;
+/// // Here up is z.
+/// assert_eq!(drive.imu[0].accel_mps2, [0.0, 0.0, 9.81]);
+/// assert_eq!(drive.imu[0].gyro_rps, [0.0, 0.0, 0.1]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read(dir: &Path, position_sigma_m: f64) -> Result<Dataset, ImportError> {
     let inside = dir.join("mav0");
     let mav = if inside.is_dir() { &inside } else { dir };

@@ -13,6 +13,17 @@ use std::path::PathBuf;
 use crate::dataset::DatasetError;
 
 /// A recording could not be imported. `Display` is one line.
+///
+/// ```
+/// use inekf_client::import::{ImportError, tum};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("poses.txt");
+/// std::fs::write(&path, "0.5 1 2 3 0 0 0 1\n0.5 1 2 3 0 0 0 1\n")?;
+/// // Stamps that do not increase are refused, with the line.
+/// assert!(matches!(tum::read(&path), Err(ImportError::Line { line: 2, .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// A file cannot be read.

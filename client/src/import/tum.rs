@@ -15,6 +15,19 @@ const COLUMNS: &str = "seconds x y z qx qy qz qw";
 ///
 /// # Errors
 /// [`ImportError`] with the line; stamps have to increase.
+///
+/// ```
+/// use inekf_client::dataset::Truth;
+/// use inekf_client::import::tum;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("poses.txt");
+/// std::fs::write(&path, "# seconds x y z qx qy qz qw\n1.0 0 0 0 0 0 0 1\n1.5 2 0 0 0 0 0 1\n")?;
+/// let Truth::Spatial(rows) = tum::read(&path)? else { unreachable!() };
+/// // Two metres in half a second; the format has no velocity of its own.
+/// assert_eq!((rows[1].stamp_ns, rows[1].v_w_mps[0]), (1_500_000_000, 4.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read(path: &Path) -> Result<Truth, ImportError> {
     let rows = lines::read(path, 7, COLUMNS, seconds_to_ns)?;
     let truth = (0..rows.len())

@@ -36,6 +36,15 @@ const HEAD: &str = "\
 ";
 
 /// The text of the header.
+///
+/// ```
+/// use inekf_client::layout;
+///
+/// // The header checks itself: a compiler that lays the structs out otherwise says so.
+/// let header = layout::c();
+/// assert!(header.contains("double gyro_rps[3];"));
+/// assert!(header.contains("the layout is not the daemon's"));
+/// ```
 #[must_use]
 pub fn c() -> String {
     let mut text = HEAD.to_owned();

@@ -13,6 +13,15 @@ const NAMES: Names = Names {
 };
 
 /// An object with `messages` (name, type name, size, alignment, fields with offset, type and counts) and `codes`.
+///
+/// ```
+/// use inekf_client::layout;
+///
+/// let contract: serde_json::Value = serde_json::from_str(&layout::json())?;
+/// let imu = &contract["messages"][1];
+/// assert_eq!((imu["name"].as_str(), imu["size"].as_u64()), (Some("ImuSample"), Some(80)));
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 #[must_use]
 pub fn json() -> String {
     let messages: Vec<Value> = LAYOUTS

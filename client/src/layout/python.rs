@@ -55,6 +55,14 @@ for _message in MESSAGES:
 "#;
 
 /// The text of the module.
+///
+/// ```
+/// use inekf_client::layout;
+///
+/// let module = layout::python();
+/// assert!(module.contains("(\"gyro_rps\", ctypes.c_double * 3)"));
+/// assert!(module.contains("\"inekf.ImuSample.v1\""));
+/// ```
 #[must_use]
 pub fn python() -> String {
     let mut text = HEAD.to_owned();

@@ -31,6 +31,21 @@ pub const POLL: Duration = Duration::from_millis(50);
 pub const PERIOD: Duration = Duration::from_secs(1);
 
 /// What is done with each picture; `false` ends the monitor.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, Show};
+///
+/// // Three pictures, and it is enough.
+/// let mut seen = 0;
+/// let show: Show<'_> = &mut |_: &Picture| {
+///     seen += 1;
+///     Ok(seen < 3)
+/// };
+/// let picture = Picture::new("car", Model::Imu)?;
+/// assert!(show(&picture)? && show(&picture)? && !show(&picture)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub type Show<'a> = &'a mut dyn FnMut(&Picture) -> anyhow::Result<bool>;
 
 /// Watches the daemon of `instance` and shows a picture every [`PERIOD`], until `show` or `stop` ends it. `stop` is asked
@@ -38,6 +53,19 @@ pub type Show<'a> = &'a mut dyn FnMut(&Picture) -> anyhow::Result<bool>;
 ///
 /// # Errors
 /// No daemon answers, a port fails, or what `show` returns.
+///
+/// It is not run here, for it needs a daemon, another process:
+///
+/// ```no_run
+/// use inekf_client::monitor::{monitor, text};
+/// use inekf_shared::topic::Instance;
+///
+/// monitor(&Instance::new("car")?, &mut || Ok(false), &mut |picture| {
+///     println!("{}", text::line(picture));
+///     Ok(true)
+/// })?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn monitor(
     instance: &Instance,
     stop: &mut dyn FnMut() -> anyhow::Result<bool>,
@@ -51,6 +79,34 @@ pub fn monitor(
 }
 
 /// Reads what one daemon says of itself, and its estimates.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_client::monitor::Watcher;
+/// use inekf_client::read::EstimateReader;
+/// use inekf_shared::message::{EstimateSe23, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = || transport::open_node_with("doc", &config);
+/// let instance = Instance::new("car")?;
+/// let reader = EstimateReader::<EstimateSe23>::open_on(node()?, &instance)?;
+/// let mut watcher = Watcher::open_on(node()?, reader, &instance)?;
+/// // What a daemon does, a few times:
+/// let daemon = node()?;
+/// let estimates = transport::estimate::<EstimateSe23>(&daemon, &instance)?.publisher()?;
+/// for _ in 0..5 {
+///     estimates.send_copy(EstimateSe23::ZERO)?;
+/// }
+/// watcher.drain()?;
+/// let picture = watcher.picture(Duration::from_secs(1));
+/// assert_eq!((picture.estimate_rate_hz, picture.missed), (5.0, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Watcher<E: Estimate> {
     estimates: EstimateReader<E>,
     health: Listening<Health>,
@@ -92,6 +148,28 @@ impl<E: Estimate> Watcher<E> {
     ///
     /// # Errors
     /// A port fails.
+    ///
+    /// Nothing waits is no fault:
+    ///
+    /// ```
+    ///
+    /// use inekf_client::monitor::Watcher;
+    /// use inekf_client::read::EstimateReader;
+    /// use inekf_shared::message::EstimateSe2;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// let instance = Instance::new("car")?;
+    /// let reader = EstimateReader::<EstimateSe2>::open_on(node()?, &instance)?;
+    /// let mut watcher = Watcher::open_on(node()?, reader, &instance)?;
+    /// watcher.drain()?;
+    /// assert!(watcher.picture(inekf_client::monitor::PERIOD).head.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn drain(&mut self) -> anyhow::Result<()> {
         while let Some(health) = self.health.receive()? {
             self.picture.take_health(&health);

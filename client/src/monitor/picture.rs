@@ -14,6 +14,14 @@ use crate::table::EstimateState;
 const REMEMBERED: usize = 120;
 
 /// A mean of three axes and, if known, its standard deviations.
+///
+/// ```
+/// use inekf_client::monitor::Quantity;
+///
+/// let east = Quantity { mean: [10.0, 0.0, 0.0], sigma: Some([0.5, 0.5, 1.0]) };
+/// // The truth, 10.8 m, is less than two of its standard deviations away.
+/// assert!(east.sigma.is_some_and(|sigma| (10.8 - east.mean[0]) / sigma[0] < 2.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
     /// The mean.
@@ -23,6 +31,28 @@ pub struct Quantity {
 }
 
 /// A picture.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::Picture;
+/// use inekf_shared::message::{ESTIMATE_PROPAGATED, EstimateSe23, Zero};
+///
+/// let mut picture = Picture::new("car", Model::Imu)?;
+/// let mut estimate = EstimateSe23::ZERO;
+/// estimate.q_wb = [0.0, 0.0, 0.0, 1.0];
+/// estimate.head.flags = ESTIMATE_PROPAGATED;
+/// (estimate.head.sent_ns, estimate.head.published_ns) = (1000, 2500);
+/// picture.take_estimate(&estimate);
+/// picture.take_estimate(&estimate);
+/// picture.finish(10_000, Duration::from_millis(500), 0);
+/// // Two in half a second; 1.5 us from the sample to its estimate; published 7.5 us ago.
+/// assert_eq!(picture.estimate_rate_hz, 4.0);
+/// assert_eq!(picture.latency.max(), 1500);
+/// assert_eq!(picture.estimate_age_ns, Some(7500));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Picture {
     /// Name of the daemon.
@@ -79,11 +109,44 @@ impl Picture {
     }
 
     /// Takes a health message.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::model::Model;
+    /// use inekf_client::monitor::Picture;
+    /// use inekf_shared::message::{Health, Zero};
+    ///
+    /// let mut picture = Picture::new("car", Model::Imu)?;
+    /// picture.take_health(&Health { stamp_ns: 1_000, ..Health::ZERO });
+    /// picture.finish(5_000, Duration::from_secs(1), 0);
+    /// assert_eq!(picture.health_age_ns, Some(4_000));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn take_health(&mut self, health: &Health) {
         self.health = Some(*health);
     }
 
     /// Takes an estimate.
+    ///
+    /// ```
+    /// use inekf_client::model::Model;
+    /// use inekf_client::monitor::Picture;
+    /// use inekf_shared::message::{EstimateSe23, Zero};
+    ///
+    /// let mut estimate = EstimateSe23::ZERO;
+    /// estimate.q_wb = [0.0, 0.0, 0.0, 1.0];
+    /// estimate.gyro_bias_rps = [0.01, 0.0, 0.0];
+    /// let mut picture = Picture::new("car", Model::Imu)?;
+    /// // Biases are shown only where they are estimated.
+    /// estimate.head.dimension = 9;
+    /// picture.take_estimate(&estimate);
+    /// assert!(picture.biases.is_none());
+    /// estimate.head.dimension = 15;
+    /// picture.take_estimate(&estimate);
+    /// assert_eq!(picture.biases.map(|[gyro, _]| gyro), Some([0.01, 0.0, 0.0]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn take_estimate<E: Estimate>(&mut self, estimate: &E) {
         let head = estimate.head();
         self.count += 1;
@@ -106,6 +169,19 @@ impl Picture {
     }
 
     /// Closes the picture at `now_ns` (CLOCK_MONOTONIC), after `elapsed`; `missed` counts since the monitor's start.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::model::Model;
+    /// use inekf_client::monitor::Picture;
+    ///
+    /// // Without an estimate there is a rate, and no age.
+    /// let mut picture = Picture::new("car", Model::Imu)?;
+    /// picture.finish(5_000, Duration::from_secs(1), 0);
+    /// assert_eq!((picture.estimate_rate_hz, picture.estimate_age_ns), (0.0, None));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn finish(&mut self, now_ns: u64, elapsed: Duration, missed: u64) {
         self.estimate_rate_hz = self.count as f64 / elapsed.as_secs_f64().max(1e-9);
         self.missed = missed;
@@ -120,12 +196,45 @@ impl Picture {
     }
 
     /// Begins the next picture: what is counted by the second starts from zero.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::model::Model;
+    /// use inekf_client::monitor::Picture;
+    /// use inekf_shared::message::{EstimateSe2, Zero};
+    ///
+    /// let mut picture = Picture::new("cart", Model::Odometry2d)?;
+    /// picture.take_estimate(&EstimateSe2::ZERO);
+    /// picture.begin();
+    /// picture.finish(0, Duration::from_secs(1), 0);
+    /// // The rate is of this second; the last state stays.
+    /// assert!(picture.estimate_rate_hz == 0.0 && picture.pose.is_some());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn begin(&mut self) {
         self.count = 0;
         self.latency.reset();
     }
 
     /// Position, m, world.
+    ///
+    /// ```
+    /// use inekf_client::model::Model;
+    /// use inekf_client::monitor::Picture;
+    /// use inekf_shared::message::{EstimateSe2, Zero};
+    ///
+    /// let mut picture = Picture::new("cart", Model::Odometry2d)?;
+    /// assert!(picture.position().is_none());
+    /// let mut estimate = EstimateSe2::ZERO;
+    /// (estimate.p_w_m, estimate.head.dimension) = ([3.0, 4.0], 3);
+    /// estimate.covariance[3] = 0.25;
+    /// picture.take_estimate(&estimate);
+    /// let position = picture.position().expect("an estimate came");
+    /// assert_eq!(position.mean, [3.0, 4.0, 0.0]);
+    /// assert_eq!(position.sigma.map(|sigma| sigma[0]), Some(0.5));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn position(&self) -> Option<Quantity> {
         self.pose.map(|pose| Quantity {
@@ -135,6 +244,20 @@ impl Picture {
     }
 
     /// Last NIS of each position source that has had a fix.
+    ///
+    /// ```
+    /// use inekf_client::model::Model;
+    /// use inekf_client::monitor::Picture;
+    /// use inekf_shared::message::{EstimateHead, EstimateSe2, Zero};
+    ///
+    /// let mut picture = Picture::new("cart", Model::Odometry2d)?;
+    /// let mut estimate = EstimateSe2 { head: EstimateHead::UNSTARTED, ..EstimateSe2::ZERO };
+    /// estimate.head.nis[2] = 1.5;
+    /// picture.take_estimate(&estimate);
+    /// // A source that has had no fix has no number.
+    /// assert_eq!(picture.nis(), [(2, 1.5)]);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn nis(&self) -> Vec<(usize, f64)> {
         let nis = self.head.map_or([f64::NAN; MAX_SOURCES], |head| head.nis);

@@ -18,6 +18,16 @@ use super::{Picture, monitor, text};
 ///
 /// # Errors
 /// No daemon answers, a port fails, or the terminal does.
+///
+/// It is not run here, for it takes the terminal, and needs a daemon, another process:
+///
+/// ```no_run
+/// use inekf_client::monitor::screen;
+/// use inekf_shared::topic::Instance;
+///
+/// screen::show(&Instance::new("car")?, &|| false)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn show(instance: &Instance, stop: &dyn Fn() -> bool) -> anyhow::Result<()> {
     let mut terminal: DefaultTerminal = ratatui::try_init().context("taking the terminal")?;
     let outcome = monitor(
@@ -49,6 +59,20 @@ fn quit_pressed() -> anyhow::Result<bool> {
 }
 
 /// Draws a picture on the whole frame.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, screen};
+/// use ratatui::Terminal;
+/// use ratatui::backend::TestBackend;
+///
+/// let picture = Picture::new("car", Model::Imu)?;
+/// let mut terminal = Terminal::new(TestBackend::new(100, 30))?;
+/// terminal.draw(|frame| screen::draw(frame, &picture))?;
+/// let text: String = terminal.backend().buffer().content().iter().map(|cell| cell.symbol()).collect();
+/// assert!(text.starts_with(" car model imu"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn draw(frame: &mut Frame<'_>, picture: &Picture) {
     let [head, upper, lower, timing] = Layout::vertical([
         Constraint::Length(1),

@@ -9,6 +9,22 @@ use super::Picture;
 use crate::plot::format_ns;
 
 /// One line: state, rates, age, position with one sigma, heading, NIS, counters, latency.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+/// use inekf_shared::message::{EstimateSe2, Zero};
+///
+/// let mut picture = Picture::new("cart", Model::Odometry2d)?;
+/// picture.take_estimate(&EstimateSe2 { p_w_m: [1.0, 2.0], ..EstimateSe2::ZERO });
+/// picture.finish(0, Duration::from_secs(1), 0);
+/// let line = text::line(&picture);
+/// assert!(line.starts_with("no word of the daemon yet, samples 0.0 Hz, estimates 1.0 Hz"));
+/// assert!(line.contains("position 1.000 2.000 0.000 m") && line.contains("heading 0.00 deg"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn line(picture: &Picture) -> String {
     let mut parts = vec![state(picture), rates(picture)];
@@ -38,6 +54,21 @@ pub fn line(picture: &Picture) -> String {
 }
 
 /// The daemon's state, and what it waits for.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+/// use inekf_shared::message::{Health, STATE_WAITING, WAITING_FOR_POSITION, Zero};
+///
+/// let mut picture = Picture::new("car", Model::Imu)?;
+/// picture.take_health(&Health {
+///     state: STATE_WAITING,
+///     waiting_for: WAITING_FOR_POSITION,
+///     ..Health::ZERO
+/// });
+/// assert_eq!(text::state(&picture), "waiting for position");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn state(picture: &Picture) -> String {
     let Some(health) = picture.health else {
@@ -54,6 +85,21 @@ pub fn state(picture: &Picture) -> String {
 }
 
 /// Rates of samples and estimates, and the age of the last estimate.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+/// use inekf_shared::message::{Health, Zero};
+///
+/// let mut picture = Picture::new("car", Model::Imu)?;
+/// picture.take_health(&Health { imu_rate_hz: 200.0, ..Health::ZERO });
+/// picture.finish(0, Duration::from_secs(1), 3);
+/// // Estimates that this monitor was too slow for are said.
+/// assert_eq!(text::rates(&picture), "samples 200.0 Hz, estimates 0.0 Hz, 3 missed here");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn rates(picture: &Picture) -> String {
     let samples = picture.health.map_or(0.0, |health| health.imu_rate_hz);
@@ -71,6 +117,20 @@ pub fn rates(picture: &Picture) -> String {
 }
 
 /// What became of the fixes, as the last health message has it.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+/// use inekf_shared::message::{Health, Zero};
+///
+/// let mut picture = Picture::new("car", Model::Imu)?;
+/// assert_eq!(text::fixes(&picture), "");
+/// let mut health = Health::ZERO;
+/// (health.counters.accepted, health.counters.gated) = (12, 1);
+/// picture.take_health(&health);
+/// assert_eq!(text::fixes(&picture), "accepted 12 gated 1 late 0 lost 0 rejected 0");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn fixes(picture: &Picture) -> String {
     let Some(health) = picture.health else {
@@ -84,6 +144,18 @@ pub fn fixes(picture: &Picture) -> String {
 }
 
 /// From the sending of a sample to its estimate's publication.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+///
+/// let mut picture = Picture::new("car", Model::Imu)?;
+/// for ns in [900, 900, 900, 8_000] {
+///     picture.latency.record(ns)?;
+/// }
+/// assert_eq!(text::latency(&picture), "latency p50 900 ns p99 8 µs max 8 µs");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn latency(picture: &Picture) -> String {
     let at = |quantile| format_ns(picture.latency.value_at_quantile(quantile) as f64);
@@ -96,6 +168,21 @@ pub fn latency(picture: &Picture) -> String {
 }
 
 /// The state: a line a quantity, with one sigma where it is known.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+/// use inekf_shared::message::{EstimateSe2, Zero};
+///
+/// let mut picture = Picture::new("cart", Model::Odometry2d)?;
+/// assert_eq!(text::estimate(&picture), ["no estimate yet"]);
+/// picture.take_estimate(&EstimateSe2 { theta_rad: 0.1, ..EstimateSe2::ZERO });
+/// let lines = text::estimate(&picture);
+/// // No velocity and no biases: this model has none.
+/// assert!(lines[0].starts_with("position ") && lines[1].starts_with("attitude "));
+/// assert_eq!(lines.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn estimate(picture: &Picture) -> Vec<String> {
     let Some(pose) = picture.pose else {
@@ -135,6 +222,21 @@ pub fn estimate(picture: &Picture) -> Vec<String> {
 
 /// Each source of fixes that was ever heard of: how old its newest fused fix is, by the sensors' clock, and how long ago
 /// anything came of it, by this machine's.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+/// use inekf_shared::message::{Health, INPUT_HEADING, Zero, source_index};
+///
+/// let mut health = Health { stamp_ns: 5_000_000, ..Health::ZERO };
+/// let compass = source_index(INPUT_HEADING, 1).expect("there is such a source");
+/// health.delivered_ns[compass] = 3_000_000;
+/// let mut picture = Picture::new("car", Model::Imu)?;
+/// picture.take_health(&health);
+/// // It speaks, and nothing of it was fused.
+/// assert_eq!(text::sources(&picture), ["heading 1: none fused, heard 2 ms ago"]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn sources(picture: &Picture) -> Vec<String> {
     let Some(health) = picture.health else {
@@ -163,6 +265,19 @@ pub fn sources(picture: &Picture) -> Vec<String> {
 }
 
 /// Fixes: counters, the last NIS of each position source, and the ages of each source.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+/// use inekf_shared::message::{Health, REASON_NOT_FINITE, Zero};
+///
+/// let mut health = Health::ZERO;
+/// health.rejected_by_reason[REASON_NOT_FINITE as usize] = 2;
+/// let mut picture = Picture::new("car", Model::Imu)?;
+/// picture.take_health(&health);
+/// assert!(text::updates(&picture).contains(&"  2 not finite".to_owned()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn updates(picture: &Picture) -> Vec<String> {
     let mut lines = Vec::new();
@@ -191,6 +306,21 @@ pub fn updates(picture: &Picture) -> Vec<String> {
 }
 
 /// Messages by input since the daemon's start, and the rates.
+///
+/// ```
+/// use inekf_client::model::Model;
+/// use inekf_client::monitor::{Picture, text};
+/// use inekf_shared::message::{Health, INPUT_IMU, Zero};
+///
+/// let mut health = Health { uptime_ns: 7_900_000_000, instance_pid: 42, ..Health::ZERO };
+/// health.received[INPUT_IMU] = 1500;
+/// let mut picture = Picture::new("car", Model::Imu)?;
+/// picture.take_health(&health);
+/// let lines = text::inputs(&picture);
+/// assert!(lines.iter().any(|line| line.starts_with("imu ") && line.ends_with(" 1500")));
+/// assert_eq!(lines.last().map(String::as_str), Some("up 7 s, process 42"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub fn inputs(picture: &Picture) -> Vec<String> {
     let mut lines: Vec<String> = rates(picture).split(", ").map(str::to_owned).collect();

@@ -14,6 +14,21 @@ const HEIGHT: u32 = 260;
 const COLUMNS: usize = 800;
 
 /// What is drawn.
+///
+/// ```
+/// use inekf_client::consistency::band_95;
+/// use inekf_client::plot::{ConsistencyPlot, consistency};
+///
+/// let plot = ConsistencyPlot {
+///     name: "NEES",
+///     time_s: &[0.0, 1.0, 2.0],
+///     values: &[2.5, 3.1, 40.0],
+///     band: band_95(3),
+/// };
+/// // The key names what is drawn.
+/// assert!(consistency("A run", &plot)?.contains("NEES"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct ConsistencyPlot<'a> {
     /// What the numbers are, such as `NEES`.
@@ -30,6 +45,16 @@ pub struct ConsistencyPlot<'a> {
 ///
 /// # Errors
 /// [`PlotError`] if the drawing library fails.
+///
+/// ```
+/// use inekf_client::plot::{ConsistencyPlot, consistency};
+///
+/// let none = ConsistencyPlot { name: "NIS", time_s: &[], values: &[], band: (0.2, 9.3) };
+/// // Nothing to show is an empty figure and no failure.
+/// let svg = consistency("No fix came", &none)?;
+/// assert!(svg.starts_with("<svg") && svg.contains("No fix came"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn consistency(title: &str, plot: &ConsistencyPlot<'_>) -> Result<String, PlotError> {
     let keys = [
         Key {

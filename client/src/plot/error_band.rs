@@ -19,6 +19,21 @@ const GAP: u32 = 12;
 const COLUMNS: usize = 800;
 
 /// One quantity over time.
+///
+/// ```
+/// use inekf_client::plot::{Panel, error_bands};
+///
+/// let panel = Panel {
+///     label: "East error".to_owned(),
+///     unit: "m".to_owned(),
+///     time_s: vec![0.0, 1.0],
+///     error: vec![0.5, -0.2],
+///     sigma: vec![], // not known: no band
+/// };
+/// let svg = error_bands("A run", &[panel])?;
+/// assert!(svg.contains("East error") && !svg.contains("three standard deviations"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
     /// What it is, such as `East error`.
@@ -35,6 +50,27 @@ pub struct Panel {
 
 /// Panels of position by axis (m) and heading (degrees). `deviations` is as long as `errors`, or
 /// empty; time counts from `start_ns`.
+///
+/// ```
+/// use inekf_client::evaluate::{Deviations, ErrorSample};
+/// use inekf_client::plot::error_panels;
+/// use nalgebra::Vector3;
+///
+/// let error = ErrorSample {
+///     stamp_ns: 3_000_000_000,
+///     position_m: Vector3::new(1.0, 2.0, 3.0),
+///     velocity_mps: None,
+///     heading_rad: 90_f64.to_radians(),
+///     attitude_rad: 90_f64.to_radians(),
+/// };
+/// let sigma = Deviations { position_m: Vector3::repeat(0.5), heading_rad: 0.1 };
+/// let panels = error_panels(&[error], &[sigma], 1_000_000_000);
+/// let labels: Vec<&str> = panels.iter().map(|panel| panel.label.as_str()).collect();
+/// assert_eq!(labels, ["East error", "North error", "Up error", "Heading error"]);
+/// // Two seconds after the start; degrees for the heading.
+/// assert_eq!((panels[1].time_s[0], panels[1].error[0], panels[1].sigma[0]), (2.0, 2.0, 0.5));
+/// assert!((panels[3].error[0] - 90.0).abs() < 1e-12);
+/// ```
 pub fn error_panels(
     errors: &[ErrorSample],
     deviations: &[Deviations],
@@ -72,6 +108,21 @@ pub fn error_panels(
 ///
 /// # Errors
 /// [`PlotError`] if the drawing library fails.
+///
+/// ```
+/// use inekf_client::plot::{Panel, error_bands};
+///
+/// let panel = Panel {
+///     label: "North error".to_owned(),
+///     unit: "m".to_owned(),
+///     time_s: vec![0.0, 1.0],
+///     error: vec![0.5, -0.2],
+///     sigma: vec![0.4, 0.3],
+/// };
+/// let svg = error_bands("A run", &[panel])?;
+/// assert!(svg.contains("three standard deviations, as the filter sees them"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn error_bands(title: &str, panels: &[Panel]) -> Result<String, PlotError> {
     let mut keys = vec![Key {
         mark: Mark::Line(2),

@@ -18,6 +18,19 @@ const HEIGHT: u32 = 380;
 const PER_DECADE: f64 = 60.0;
 
 /// One curve: a name and a histogram of nanoseconds.
+///
+/// ```
+/// use hdrhistogram::Histogram;
+/// use inekf_client::plot::{LatencySeries, latency};
+///
+/// let mut histogram = Histogram::<u64>::new(3)?;
+/// for ns in [800, 900, 1_000, 25_000] {
+///     histogram.record(ns)?;
+/// }
+/// let svg = latency("Round trip", &[LatencySeries { name: "sent to read", histogram: &histogram }])?;
+/// assert!(svg.contains("sent to read"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct LatencySeries<'a> {
     /// What was measured, such as `sent to read`.
@@ -30,6 +43,17 @@ pub struct LatencySeries<'a> {
 ///
 /// # Errors
 /// [`PlotError`] if the drawing library fails.
+///
+/// ```
+/// use hdrhistogram::Histogram;
+/// use inekf_client::plot::{LatencySeries, latency};
+///
+/// // What was never measured is left out.
+/// let empty = Histogram::<u64>::new(3)?;
+/// let svg = latency("Round trip", &[LatencySeries { name: "nobody read", histogram: &empty }])?;
+/// assert!(svg.starts_with("<svg") && !svg.contains("nobody read"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn latency(title: &str, series: &[LatencySeries<'_>]) -> Result<String, PlotError> {
     let series: Vec<LatencySeries<'_>> = series
         .iter()
@@ -132,6 +156,14 @@ fn percentile_label(x: f64) -> String {
 }
 
 /// Nanoseconds in a unit that suits them, three digits: `850 ns`, `1.25 µs`, `3.4 ms`, `2 s`.
+///
+/// ```
+/// use inekf_client::plot::format_ns;
+///
+/// assert_eq!(format_ns(850.0), "850 ns");
+/// assert_eq!(format_ns(1_250.0), "1.25 µs");
+/// assert_eq!(format_ns(2e9), "2 s");
+/// ```
 pub fn format_ns(ns: f64) -> String {
     let (value, unit) = [(1e9, "s"), (1e6, "ms"), (1e3, "µs")]
         .into_iter()

@@ -20,6 +20,13 @@ pub use report::{Report, Section, Table};
 pub use trajectory::{TrajectoryPlot, trajectory};
 
 /// A figure could not be drawn.
+///
+/// ```
+/// use inekf_client::plot::PlotError;
+///
+/// let error = PlotError { figure: "Trajectory".to_owned(), reason: "no font".to_owned() };
+/// assert_eq!(error.to_string(), "the figure `Trajectory` could not be drawn: no font");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the figure `{figure}` could not be drawn: {reason}")]
 pub struct PlotError {

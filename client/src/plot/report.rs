@@ -3,6 +3,27 @@
 use std::fmt::Write;
 
 /// A report: a title, a line below it, and sections.
+///
+/// ```
+/// use inekf_client::plot::{Report, Section, Table};
+///
+/// let report = Report {
+///     title: "Laps <1 & 2>".to_owned(),
+///     subtitle: "on a wet day".to_owned(),
+///     sections: vec![Section {
+///         heading: "Error".to_owned(),
+///         table: Some(Table {
+///             header: vec!["quantity".to_owned(), "RMSE / m".to_owned()],
+///             rows: vec![vec!["east".to_owned(), "0.42".to_owned()]],
+///         }),
+///         ..Section::default()
+///     }],
+/// };
+/// let html = report.to_html();
+/// // Text is text, whatever is in it.
+/// assert!(html.contains("<h1>Laps &lt;1 &amp; 2&gt;</h1>"));
+/// assert!(html.contains("<h2>Error</h2>") && html.contains("0.42"));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// The title.
@@ -14,6 +35,17 @@ pub struct Report {
 }
 
 /// A part of a report; every field may be empty.
+///
+/// ```
+/// use inekf_client::plot::{Report, Section, TrajectoryPlot, trajectory};
+///
+/// let svg = trajectory("From above", &TrajectoryPlot { truth: &[[0.0, 0.0], [5.0, 1.0]], ..Default::default() })?;
+/// let section = Section { text: "A short way.".to_owned(), svg: svg.clone(), ..Section::default() };
+/// let html = Report { sections: vec![section], ..Report::default() }.to_html();
+/// // The figure is in the page itself: one file to send.
+/// assert!(html.contains(&svg) && html.contains("<p>A short way.</p>"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Section {
     /// The heading.
@@ -27,6 +59,15 @@ pub struct Section {
 }
 
 /// A table; the first column is text, the others are numbers and set to the right.
+///
+/// ```
+/// use inekf_client::plot::{Report, Section, Table};
+///
+/// let table = Table { header: vec!["fix".to_owned(), "count".to_owned()], rows: vec![] };
+/// let section = Section { table: Some(table), ..Section::default() };
+/// let html = Report { sections: vec![section], ..Report::default() }.to_html();
+/// assert!(html.contains("<th>fix</th>") && html.contains("<th>count</th>"));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     /// Column names with units.
@@ -49,6 +90,15 @@ th{border-bottom:2px solid #a8adb4;font-weight:600}";
 
 impl Report {
     /// The report as HTML.
+    ///
+    /// ```
+    /// use inekf_client::plot::Report;
+    ///
+    /// let html = Report { title: "A run".to_owned(), ..Report::default() }.to_html();
+    /// assert!(html.starts_with("<!DOCTYPE html>") && html.ends_with("</html>\n"));
+    /// // Nothing is fetched from elsewhere.
+    /// assert!(!html.contains("http"));
+    /// ```
     pub fn to_html(&self) -> String {
         let (title, subtitle) = (escape(&self.title), escape(&self.subtitle));
         let mut html = format!(

@@ -15,6 +15,20 @@ const GREATEST_HEIGHT: f64 = 720.0;
 const MOST_FIXES: usize = 3000;
 
 /// What is drawn; points are `[east, north]` in metres. Any of the lists may be empty.
+///
+/// ```
+/// use inekf_client::plot::{TrajectoryPlot, trajectory};
+///
+/// // East and north in metres; a list may be missing.
+/// let plot = TrajectoryPlot {
+///     truth: &[[0.0, 0.0], [10.0, 0.0], [10.0, 5.0]],
+///     estimate: &[[0.2, 0.1], [9.8, 0.2], [10.1, 4.9]],
+///     ..TrajectoryPlot::default()
+/// };
+/// let svg = trajectory("A corner", &plot)?;
+/// assert!(svg.contains("estimate") && !svg.contains("position fixes"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TrajectoryPlot<'a> {
     /// The true path.
@@ -29,6 +43,24 @@ pub struct TrajectoryPlot<'a> {
 ///
 /// # Errors
 /// [`PlotError`] if the drawing library fails.
+///
+/// ```
+/// use inekf_client::dataset::Truth;
+/// use inekf_client::plot::{TrajectoryPlot, trajectory};
+/// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+///
+/// let options = SimulationOptions { duration_s: 5.0, ..SimulationOptions::default() };
+/// let drive = simulate(Scenario::RoadCircuit, &options)?;
+/// let Truth::Spatial(truth) = &drive.truth else { unreachable!() };
+/// let truth: Vec<[f64; 2]> = truth.iter().map(|row| [row.p_w_m[0], row.p_w_m[1]]).collect();
+/// let fixes: Vec<[f64; 2]> =
+///     drive.position.iter().map(|fix| [fix.position_w_m[0], fix.position_w_m[1]]).collect();
+/// let plot = TrajectoryPlot { truth: &truth, fixes: &fixes, ..TrajectoryPlot::default() };
+/// let svg = trajectory("Five seconds on the road", &plot)?;
+/// // A dot for each fix, at least.
+/// assert!(fixes.len() >= 25 && svg.matches("<circle").count() >= fixes.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn trajectory(title: &str, plot: &TrajectoryPlot<'_>) -> Result<String, PlotError> {
     let frame = Frame::around(plot);
     let mut keys = Vec::new();

@@ -18,6 +18,36 @@ use crate::rows::{RowBuilder, row};
 use crate::table::{EstimateTable, Layout};
 
 /// What a recording says of the estimate.
+///
+/// ```
+/// use inekf_client::recording::estimates::read_estimates;
+/// use inekf_client::recording::{Head, RECORDING_VERSION, Writer};
+/// use inekf_shared::message::{ESTIMATE_PROPAGATED, EstimateSe2, MODEL_ODOMETRY_2D, Zero};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("drive.rec");
+/// let head = Head {
+///     version: RECORDING_VERSION,
+///     model: MODEL_ODOMETRY_2D,
+///     instance: "cart".to_owned(),
+///     began_unix_s: 0,
+///     config: String::new(),
+/// };
+/// let mut writer = Writer::create(&path, &head)?;
+/// for stamp_ns in [10, 20] {
+///     let mut estimate = EstimateSe2::ZERO;
+///     (estimate.head.stamp_ns, estimate.head.flags) = (stamp_ns, ESTIMATE_PROPAGATED);
+///     writer.estimate(&estimate)?;
+/// }
+/// writer.finish()?;
+/// // A process that is killed leaves half a frame: a row less, and it is said.
+/// let file = std::fs::OpenOptions::new().write(true).open(&path)?;
+/// file.set_len(file.metadata()?.len() - 1)?;
+/// let estimates = read_estimates(&path)?;
+/// assert_eq!(estimates.table.rows.len(), 1);
+/// assert!(estimates.damage.torn > 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimates {
     /// A row for each propagated sample, after the updates due at its stamp, with covariance.
@@ -33,6 +63,17 @@ pub struct Estimates {
 ///
 /// # Errors
 /// It cannot be read.
+///
+/// ```
+/// use inekf_client::recording::estimates::is_recording;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("estimate.csv");
+/// std::fs::write(&path, "t_ns,theta,x,y\n")?;
+/// // So `report` tells a recording from an estimate CSV.
+/// assert!(!is_recording(&path)?);
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub fn is_recording(path: &Path) -> io::Result<bool> {
     let mut start = Vec::new();
     let beginning = FRAME_MAGIC.len() as u64;
@@ -44,6 +85,17 @@ pub fn is_recording(path: &Path) -> io::Result<bool> {
 ///
 /// # Errors
 /// It cannot be read, is no recording, or has no estimates.
+///
+/// ```
+/// use inekf_client::recording::estimates::read_estimates;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("drive.rec");
+/// std::fs::write(&path, "not a frame")?;
+/// let error = read_estimates(&path).expect_err("it is no recording");
+/// assert!(format!("{error:#}").contains("this is no recording"));
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub fn read_estimates(path: &Path) -> anyhow::Result<Estimates> {
     let reader = Reader::open(path)?;
     let model =

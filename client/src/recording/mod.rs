@@ -51,6 +51,25 @@ pub use write::Writer;
 pub const RECORDING_VERSION: u32 = 2;
 
 /// What a recording begins with.
+///
+/// ```
+/// use inekf_client::recording::{Head, RECORDING_VERSION, Reader, Writer};
+/// use inekf_shared::message::MODEL_IMU;
+///
+/// let head = Head {
+///     version: RECORDING_VERSION,
+///     model: MODEL_IMU,
+///     instance: "car".to_owned(),
+///     began_unix_s: 1_700_000_000,
+///     config: "model = 'imu'".to_owned(),
+/// };
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("drive.rec");
+/// Writer::create(&path, &head)?.finish()?;
+/// // All that is needed to replay is in the file.
+/// assert_eq!(Reader::open(&path)?.head(), &head);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Head {
     /// [`RECORDING_VERSION`].
@@ -66,6 +85,17 @@ pub struct Head {
 }
 
 /// An entry of the journal without the bytes that its message does not use.
+///
+/// ```
+/// use inekf_client::recording::Entry;
+/// use inekf_shared::message::{ImuSample, JOURNAL_IMU, JournalEntry, Message};
+///
+/// let sample = ImuSample { gyro_rps: [0.1, 0.0, 0.0], ..ImuSample::default() };
+/// let entry = Entry::of(&JournalEntry::new(7, 12, JOURNAL_IMU, sample.as_bytes()));
+/// // On the topic it has room for the longest message, on disk it has what it uses.
+/// assert_eq!(entry.message.len(), size_of::<ImuSample>());
+/// assert_eq!(ImuSample::from_bytes(&entry.message), Some(sample));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Entry {
     /// Counts the entries of one daemon, from 0.
@@ -80,6 +110,14 @@ pub struct Entry {
 
 impl Entry {
     /// What is kept of an entry.
+    ///
+    /// ```
+    /// use inekf_client::recording::Entry;
+    /// use inekf_shared::message::{JOURNAL_SETTLE, JournalEntry};
+    ///
+    /// let entry = Entry::of(&JournalEntry::new(3, 5, JOURNAL_SETTLE, &[]));
+    /// assert_eq!((entry.index, entry.estimates, entry.message.len()), (3, 5, 0));
+    /// ```
     pub fn of(entry: &JournalEntry) -> Self {
         Self {
             index: entry.index,
@@ -90,6 +128,14 @@ impl Entry {
     }
 
     /// Whether it is one that a daemon could have published.
+    ///
+    /// ```
+    /// use inekf_client::recording::Entry;
+    /// use inekf_shared::message::{JOURNAL_IMU, JOURNAL_PAYLOAD_LEN};
+    ///
+    /// let entry = |len| Entry { index: 0, estimates: 0, kind: JOURNAL_IMU, message: vec![0; len] };
+    /// assert!(entry(80).is_sound() && !entry(JOURNAL_PAYLOAD_LEN + 1).is_sound());
+    /// ```
     pub fn is_sound(&self) -> bool {
         self.message.len() <= JOURNAL_PAYLOAD_LEN
     }

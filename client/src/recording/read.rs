@@ -21,6 +21,32 @@ const CHUNK: usize = 64 * 1024;
 const MAX_FRAME: usize = 2 * 1024 * 1024;
 
 /// One frame of a recording.
+///
+/// ```
+/// use inekf_client::recording::{Head, Item, RECORDING_VERSION, Reader, Writer};
+/// use inekf_shared::message::{
+///     EstimateSe2, HeadingFix, JOURNAL_HEADING, JournalEntry, MODEL_ODOMETRY_2D, Message, Zero,
+/// };
+///
+/// # let head = Head {
+/// #     version: RECORDING_VERSION,
+/// #     model: MODEL_ODOMETRY_2D,
+/// #     instance: "cart".to_owned(),
+/// #     began_unix_s: 0,
+/// #     config: String::new(),
+/// # };
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("drive.rec");
+/// let mut writer = Writer::create(&path, &head)?;
+/// writer.entry(&JournalEntry::new(0, 0, JOURNAL_HEADING, HeadingFix::ZERO.as_bytes()))?;
+/// writer.estimate(&EstimateSe2::ZERO)?;
+/// writer.finish()?;
+/// let mut reader = Reader::open(&path)?;
+/// assert!(matches!(reader.next_item::<EstimateSe2>()?, Some(Item::Entry(entry)) if entry.index == 0));
+/// assert_eq!(reader.next_item()?, Some(Item::Estimate(EstimateSe2::ZERO)));
+/// assert_eq!(reader.next_item::<EstimateSe2>()?, None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item<E> {
     /// An entry of the journal.
@@ -30,6 +56,13 @@ pub enum Item<E> {
 }
 
 /// What could not be read.
+///
+/// ```
+/// use inekf_client::recording::read::Damage;
+///
+/// // Nothing is wrong with a recording of which all could be read.
+/// assert_eq!(Damage::default(), Damage { places: 0, bytes: 0, torn: 0 });
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Damage {
     /// Places in the middle where bytes were left out.
@@ -41,6 +74,27 @@ pub struct Damage {
 }
 
 /// Reads a recording from front to back.
+///
+/// ```
+/// use inekf_client::recording::{Head, RECORDING_VERSION, Reader};
+/// use inekf_shared::codec::{FRAME_ENTRY, FRAME_RECORDING, encode};
+/// use inekf_shared::message::{EstimateSe23, MODEL_IMU};
+///
+/// # let head = Head {
+/// #     version: RECORDING_VERSION,
+/// #     model: MODEL_IMU,
+/// #     instance: "car".to_owned(),
+/// #     began_unix_s: 0,
+/// #     config: String::new(),
+/// # };
+/// // From any source: here from memory, with bytes between the head and the end that are no frame.
+/// let mut bytes = encode(FRAME_RECORDING, &head)?;
+/// bytes.extend([0xff; 40]);
+/// let mut reader = Reader::new(&bytes[..])?;
+/// assert_eq!(reader.next_item::<EstimateSe23>()?, None);
+/// assert_eq!(reader.damage().torn, 40);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Reader<R = File> {
     source: R,
@@ -58,6 +112,16 @@ impl Reader {
     ///
     /// # Errors
     /// It cannot be read, or does not begin like a recording of this version.
+    ///
+    /// ```
+    /// use std::path::Path;
+    ///
+    /// use inekf_client::recording::Reader;
+    ///
+    /// // The error names the file.
+    /// let error = Reader::open(Path::new("no-such.rec")).expect_err("there is none");
+    /// assert!(format!("{error:#}").starts_with("no-such.rec: "));
+    /// ```
     pub fn open(path: &Path) -> anyhow::Result<Self> {
         let opened = File::open(path).map_err(anyhow::Error::from);
         opened
@@ -71,6 +135,13 @@ impl<R: Read> Reader<R> {
     ///
     /// # Errors
     /// As [`Reader::open`].
+    ///
+    /// ```
+    /// use inekf_client::recording::Reader;
+    ///
+    /// let error = Reader::new(&b"t_ns,theta,x,y\n"[..]).expect_err("a CSV");
+    /// assert!(error.to_string().contains("this is no recording"));
+    /// ```
     pub fn new(source: R) -> anyhow::Result<Self> {
         let mut reader = Self {
             source,
@@ -115,6 +186,31 @@ impl<R: Read> Reader<R> {
     ///
     /// # Errors
     /// The source cannot be read.
+    ///
+    /// ```
+    /// use inekf_client::recording::{Head, Item, RECORDING_VERSION, Reader};
+    /// use inekf_shared::codec::{FRAME_ESTIMATE, FRAME_RECORDING, encode};
+    /// use inekf_shared::message::{EstimateSe2, MODEL_ODOMETRY_2D, Zero};
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_ODOMETRY_2D,
+    /// #     instance: "cart".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let estimate = |theta_rad| EstimateSe2 { theta_rad, ..EstimateSe2::ZERO };
+    /// let mut bytes = encode(FRAME_RECORDING, &head)?;
+    /// let broken_at = bytes.len() + 100;
+    /// bytes.extend(encode(FRAME_ESTIMATE, &estimate(0.1))?);
+    /// bytes.extend(encode(FRAME_ESTIMATE, &estimate(0.2))?);
+    /// bytes[broken_at] ^= 1;
+    /// // One bit flipped: the frame is left out and counted, the next one is read.
+    /// let mut reader = Reader::new(&bytes[..])?;
+    /// assert_eq!(reader.next_item()?, Some(Item::Estimate(estimate(0.2))));
+    /// assert_eq!(reader.damage().places, 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn next_item<E: EstimateMessage>(&mut self) -> io::Result<Option<Item<E>>> {
         let mut left_out = 0;
         loop {

@@ -23,6 +23,22 @@ const FLUSH_EVERY: Duration = Duration::from_millis(100);
 const RETRY_EVERY: Duration = Duration::from_millis(500);
 
 /// What to record, and where to.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_client::recording::RecordOptions;
+/// use inekf_shared::topic::Instance;
+///
+/// let options = RecordOptions {
+///     instance: Instance::new("car")?,
+///     out: "drive.rec".into(),
+///     duration: Some(Duration::from_secs(60)),
+/// };
+/// // Without a duration it goes on until it is stopped.
+/// assert!(RecordOptions { duration: None, ..options }.duration.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct RecordOptions {
     /// The daemon.
@@ -34,6 +50,15 @@ pub struct RecordOptions {
 }
 
 /// What was recorded.
+///
+/// ```
+/// use inekf_client::recording::RecordSummary;
+///
+/// // A recording that began in the middle, and of which nothing is missing since.
+/// let summary = RecordSummary { entries: 1000, first: 250, estimates: 1200, ..Default::default() };
+/// assert_eq!((summary.entries_missed, summary.estimates_missed, summary.unwritten), (0, 0, 0));
+/// assert!(summary.first > 0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RecordSummary {
     /// Entries of the journal.
@@ -59,6 +84,22 @@ pub struct RecordSummary {
 /// # Errors
 /// The daemon publishes no journal, or the file cannot be begun, or the disk still refuses at the end; what was recorded
 /// until then is in it.
+///
+/// It is not run here, for it needs a daemon, another process:
+///
+/// ```no_run
+/// use inekf_client::recording::{RecordOptions, record};
+/// use inekf_shared::topic::Instance;
+///
+/// let options = RecordOptions {
+///     instance: Instance::new("car")?,
+///     out: "drive.rec".into(),
+///     duration: None,
+/// };
+/// let summary = record(&options, &|| false, &|line| eprintln!("{line}"))?;
+/// assert_eq!(summary.entries_missed, 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn record(
     options: &RecordOptions,
     stop: &dyn Fn() -> bool,

@@ -41,6 +41,17 @@ const AT_A_TIME: usize = 256;
 const SAMPLES_KEPT: u64 = 2;
 
 /// What to replay.
+///
+/// ```
+/// use inekf_client::recording::RerunOptions;
+///
+/// let options = RerunOptions {
+///     recording: "drive.rec".into(),
+///     out: "again.csv".into(),
+///     covariance: true,
+/// };
+/// assert_ne!(options.recording, options.out);
+/// ```
 #[derive(Clone, Debug)]
 pub struct RerunOptions {
     /// The recording.
@@ -52,6 +63,16 @@ pub struct RerunOptions {
 }
 
 /// What came of it.
+///
+/// ```
+/// use inekf_client::recording::RerunSummary;
+///
+/// let summary = RerunSummary { equal: 1200, gaps: vec![(41, 3)], ..RerunSummary::default() };
+/// assert_eq!(
+///     summary.lines(),
+///     ["1200 estimates, bit for bit equal", "missing  3 entries after entry 41"]
+/// );
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RerunSummary {
     /// Entries given to the daemon.
@@ -78,6 +99,22 @@ pub struct RerunSummary {
 ///
 /// # Errors
 /// The recording cannot be read, or the daemon not be started; a difference is no error here.
+///
+/// It is not run here, for it starts a daemon, the program `inekf-service`:
+///
+/// ```no_run
+/// use inekf_client::recording::replay::require_equal;
+/// use inekf_client::recording::{Reader, RerunOptions, rerun};
+///
+/// let options = RerunOptions {
+///     recording: "drive.rec".into(),
+///     out: "again.csv".into(),
+///     covariance: true,
+/// };
+/// let summary = rerun(&options)?;
+/// require_equal(&summary, Reader::open(&options.recording)?.head())?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn rerun(options: &RerunOptions) -> anyhow::Result<RerunSummary> {
     let head = Reader::open(&options.recording)?.head().clone();
     let model = Model::from_code(head.model).context("the recording is of an unknown model")?;
@@ -433,6 +470,20 @@ impl<E: Estimate> Recorded<E> {
 
 impl RerunSummary {
     /// What there is to say about it, a line each.
+    ///
+    /// ```
+    /// use inekf_client::recording::RerunSummary;
+    ///
+    /// let summary = RerunSummary {
+    ///     equal: 10,
+    ///     difference: Some("estimate 11 has another position".to_owned()),
+    ///     ..RerunSummary::default()
+    /// };
+    /// assert_eq!(
+    ///     summary.lines(),
+    ///     ["10 estimates, bit for bit equal, then estimate 11 has another position"]
+    /// );
+    /// ```
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let equal = match &self.difference {
@@ -475,6 +526,24 @@ impl RerunSummary {
 ///
 /// # Errors
 /// One line that says why not.
+///
+/// ```
+/// use inekf_client::recording::replay::require_equal;
+/// use inekf_client::recording::{Head, RECORDING_VERSION, RerunSummary};
+/// # use inekf_shared::message::MODEL_IMU;
+///
+/// # let head = Head {
+/// #     version: RECORDING_VERSION,
+/// #     model: MODEL_IMU,
+/// #     instance: "car".to_owned(),
+/// #     began_unix_s: 0,
+/// #     config: String::new(),
+/// # };
+/// assert!(require_equal(&RerunSummary { equal: 5, ..RerunSummary::default() }, &head).is_ok());
+/// // A comparison of nothing proves nothing.
+/// let error = require_equal(&RerunSummary::default(), &head).expect_err("none was compared");
+/// assert!(error.to_string().starts_with("nothing could be compared"));
+/// ```
 pub fn require_equal(summary: &RerunSummary, head: &Head) -> anyhow::Result<()> {
     if let Some(difference) = &summary.difference {
         bail!("the replay is not the recording: {difference}");

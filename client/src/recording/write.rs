@@ -21,6 +21,28 @@ const GATHERED: usize = 64 * 1024;
 const KEPT: usize = 8 * 1024 * 1024;
 
 /// Appends frames to a new file.
+///
+/// ```
+/// use inekf_client::recording::{Head, RECORDING_VERSION, Reader, Writer};
+/// use inekf_shared::message::{EstimateSe23, MODEL_IMU, Zero};
+///
+/// # let head = Head {
+/// #     version: RECORDING_VERSION,
+/// #     model: MODEL_IMU,
+/// #     instance: "car".to_owned(),
+/// #     began_unix_s: 0,
+/// #     config: String::new(),
+/// # };
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("drive.rec");
+/// let mut writer = Writer::create(&path, &head)?;
+/// writer.estimate(&EstimateSe23::ZERO)?;
+/// // Flushed, it can be read while the recording goes on.
+/// writer.flush()?;
+/// assert!(Reader::open(&path)?.next_item::<EstimateSe23>()?.is_some());
+/// assert_eq!(writer.given_up(), 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Writer {
     file: File,
@@ -39,6 +61,28 @@ impl Writer {
     ///
     /// # Errors
     /// As the system says; there is then no file.
+    ///
+    /// ```
+    /// use std::io::ErrorKind;
+    ///
+    /// use inekf_client::recording::{Head, RECORDING_VERSION, Writer};
+    /// # use inekf_shared::message::MODEL_IMU;
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_IMU,
+    /// #     instance: "car".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("drive.rec");
+    /// Writer::create(&path, &head)?.finish()?;
+    /// // Nothing that was recorded is ever overwritten.
+    /// let refused = Writer::create(&path, &head).expect_err("it is there");
+    /// assert_eq!(refused.kind(), ErrorKind::AlreadyExists);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn create(path: &Path, head: &Head) -> io::Result<Self> {
         let file = OpenOptions::new().write(true).create_new(true).open(path)?;
         let mut writer = Self {

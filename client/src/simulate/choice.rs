@@ -7,6 +7,15 @@ use super::{Scenario, SimulationError, SimulationOptions, simulate};
 use crate::dataset::Dataset;
 
 /// One of the simulations.
+///
+/// ```
+/// use inekf_client::simulate::{Scenario, Simulation};
+///
+/// // Names as on the command line.
+/// assert_eq!("drone-loops".parse(), Ok(Simulation::Inertial(Scenario::DroneLoops)));
+/// assert_eq!("planar-mismatch".parse(), Ok(Simulation::PlanarMismatch));
+/// assert!("submarine".parse::<Simulation>().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Simulation {
     /// An IMU on a trajectory, with position fixes.
@@ -21,6 +30,17 @@ impl Simulation {
     ///
     /// # Errors
     /// [`SimulationError`] if rate or duration cannot be.
+    ///
+    /// ```
+    /// use inekf_client::simulate::{Scenario, Simulation};
+    ///
+    /// let drive = Simulation::Inertial(Scenario::RoadCircuit).dataset(1, Some(100.0), Some(2.0))?;
+    /// assert_eq!(drive.imu.len(), 201);
+    /// // In the plane the rate is that of the odometry.
+    /// let drive = Simulation::PlanarMismatch.dataset(1, None, Some(2.0))?;
+    /// assert_eq!(drive.events().filter(|event| event.is_motion()).count(), 20);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn dataset(
         self,
         seed: u64,

@@ -15,6 +15,15 @@ use super::scenario::Kinematics;
 
 /// The noise-free gyro (rad/s) and accelerometer (m/s^2) sample for the motion from `before` to
 /// `after`, `dt_s` later; body frame, gravity of magnitude `gravity_mps2` downwards.
+///
+/// ```
+/// use inekf_client::simulate::{Scenario, ideal_sample};
+///
+/// // A car that stands: no rate, and all that the accelerometer feels is gravity, held up.
+/// let car = Scenario::StandThenDrive;
+/// let (gyro_rps, accel_mps2) = ideal_sample(&car.at(1.0), &car.at(1.005), 0.005, 9.80665);
+/// assert!(gyro_rps.norm() < 1e-12 && (accel_mps2.norm() - 9.80665).abs() < 1e-9);
+/// ```
 pub fn ideal_sample(
     before: &Kinematics,
     after: &Kinematics,
@@ -32,6 +41,18 @@ pub fn ideal_sample(
 const SMALL_ANGLE_RAD: f64 = 0.02;
 
 /// Left Jacobian of SO(3): `I + (1 - cos t)/t^2 [phi]x + (t - sin t)/t^3 [phi]x^2`, t the length.
+///
+/// ```
+/// use inekf_client::simulate::left_jacobian;
+/// use nalgebra::{Rotation3, Vector3};
+///
+/// // It leaves phi as it is, and Exp(phi) = I + [phi]x J(phi).
+/// let phi = Vector3::new(0.3, -0.5, 0.8);
+/// let jacobian = left_jacobian(&phi);
+/// assert!((jacobian * phi - phi).norm() < 1e-15);
+/// let turn = Rotation3::from_scaled_axis(phi).into_inner();
+/// assert!((phi.cross_matrix() * jacobian + nalgebra::Matrix3::identity() - turn).norm() < 1e-14);
+/// ```
 pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
     let angle = phi.norm();
     let square = angle * angle;
@@ -51,6 +72,15 @@ pub fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Its inverse: `I - 1/2 [phi]x + (1 - t/2 cot(t/2))/t^2 [phi]x^2`, for angles below a full turn.
+///
+/// ```
+/// use inekf_client::simulate::{left_jacobian, left_jacobian_inverse};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// let phi = Vector3::new(0.3, -0.5, 0.8);
+/// let product = left_jacobian(&phi) * left_jacobian_inverse(&phi);
+/// assert!((product - Matrix3::identity()).norm() < 1e-14);
+/// ```
 pub fn left_jacobian_inverse(phi: &Vector3<f64>) -> Matrix3<f64> {
     let angle = phi.norm();
     let square = angle * angle;

@@ -7,6 +7,14 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// A scalar function of time at one instant.
+///
+/// ```
+/// use inekf_client::simulate::Jet;
+///
+/// // t^2 at 3 s: 9, with the derivatives 2 t and 2.
+/// let t = Jet::time(3.0);
+/// assert_eq!(t * t, Jet { value: 9.0, rate: 6.0, second: 2.0 });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jet {
     /// The value.
@@ -19,6 +27,12 @@ pub struct Jet {
 
 impl Jet {
     /// Time itself.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Jet;
+    ///
+    /// assert_eq!(Jet::time(5.0), Jet { value: 5.0, rate: 1.0, second: 0.0 });
+    /// ```
     pub fn time(t_s: f64) -> Self {
         Self {
             value: t_s,
@@ -37,6 +51,15 @@ impl Jet {
     }
 
     /// `f(self)`, from the value of `f` and of its first two derivatives there.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Jet;
+    ///
+    /// // exp is its own derivative: of exp(2 t) at 0 they are 1, 2 and 4.
+    /// let twice = Jet::time(0.0) * 2.0;
+    /// let e = twice.value.exp();
+    /// assert_eq!(twice.chain(e, e, e), Jet { value: 1.0, rate: 2.0, second: 4.0 });
+    /// ```
     pub fn chain(self, f: f64, df: f64, ddf: f64) -> Self {
         Self {
             value: f,
@@ -46,18 +69,45 @@ impl Jet {
     }
 
     /// Sine.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Jet;
+    ///
+    /// // sin'' = -sin.
+    /// let wave = Jet::time(0.7).sin();
+    /// assert!((wave.second + wave.value).abs() < 1e-15);
+    /// ```
     pub fn sin(self) -> Self {
         let (sin, cos) = self.value.sin_cos();
         self.chain(sin, cos, -sin)
     }
 
     /// Cosine.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Jet;
+    ///
+    /// let t = Jet::time(0.7);
+    /// let one = t.sin() * t.sin() + t.cos() * t.cos();
+    /// // Constant: neither derivative is left.
+    /// assert!((one.value - 1.0).abs() < 1e-15 && one.rate.abs() < 1e-15 && one.second.abs() < 1e-15);
+    /// ```
     pub fn cos(self) -> Self {
         let (sin, cos) = self.value.sin_cos();
         self.chain(cos, -sin, -cos)
     }
 
     /// `1 / sqrt(self)`, for a value above zero.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Jet;
+    ///
+    /// let t = Jet::time(4.0);
+    /// let root = t.inverse_sqrt();
+    /// // 1/sqrt(t) squared, times t, is one, and stays one.
+    /// let one = root * root * t;
+    /// assert!((one.value - 1.0).abs() < 1e-15 && one.rate.abs() < 1e-15);
+    /// ```
     pub fn inverse_sqrt(self) -> Self {
         let f = self.value.sqrt().recip();
         let df = -0.5 * f / self.value;
@@ -120,6 +170,16 @@ impl Mul<f64> for Jet {
 }
 
 /// A vector function of time.
+///
+/// ```
+/// use inekf_client::simulate::{Jet, JetVector};
+///
+/// // A point on the unit circle at 1 rad/s is as fast as it is far out.
+/// let t = Jet::time(0.3);
+/// let point: JetVector = [t.cos(), t.sin(), Jet::constant(2.0)];
+/// let speed = point[0].rate.hypot(point[1].rate);
+/// assert!((speed - 1.0).abs() < 1e-15 && point[2].rate == 0.0);
+/// ```
 pub type JetVector = [Jet; 3];
 
 /// A constant vector.

@@ -48,6 +48,14 @@ use crate::dataset::{
 };
 
 /// Why a simulation was refused.
+///
+/// ```
+/// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+///
+/// let options = SimulationOptions { imu_rate_hz: -5.0, ..SimulationOptions::default() };
+/// let error = simulate(Scenario::RoadCircuit, &options).expect_err("no such rate");
+/// assert_eq!((error.name, error.value), ("imu_rate_hz", -5.0));
+/// ```
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name} = {value:?} is refused: {remedy}")]
 pub struct SimulationError {
@@ -67,6 +75,21 @@ pub struct SimulationError {
 ///
 /// # Errors
 /// [`SimulationError`] if a rate or the duration is not positive, or a deviation is negative.
+///
+/// ```
+/// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+///
+/// let with_fixes = SimulationOptions { duration_s: 1.0, ..SimulationOptions::default() };
+/// let without = SimulationOptions { position: None, ..with_fixes.clone() };
+/// // A sensor less leaves the noise of the others as it was.
+/// let (with_fixes, without) = (
+///     simulate(Scenario::RoadCircuit, &with_fixes)?,
+///     simulate(Scenario::RoadCircuit, &without)?,
+/// );
+/// assert_eq!(with_fixes.imu, without.imu);
+/// assert!(without.position.is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn simulate(
     scenario: Scenario,
     options: &SimulationOptions,

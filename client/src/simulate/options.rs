@@ -2,6 +2,16 @@
 
 /// Options of a simulation. `SimulationOptions::default()` is a car with a good MEMS IMU at 200 Hz
 /// and position fixes of 1 m at 5 Hz.
+///
+/// ```
+/// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+///
+/// let options = SimulationOptions { seed: 7, duration_s: 1.0, truth_every: 10, ..Default::default() };
+/// let drive = simulate(Scenario::RoadCircuit, &options)?;
+/// // What the sensors' noise was is written into meta.json for the filter.
+/// assert_eq!(drive.meta.imu_noise.map(|noise| noise.gyro_density), Some(2.5e-4));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulationOptions {
     /// Seed of all noise; default 1. The same seed and options give the same dataset bit for bit.
@@ -38,6 +48,18 @@ pub struct SimulationOptions {
 }
 
 /// Position fixes of source 0.
+///
+/// ```
+/// use inekf_client::simulate::{PositionOptions, Scenario, SimulationOptions, simulate};
+///
+/// let gnss = PositionOptions { rate_hz: 10.0, sigma_m: [0.02; 3], ..PositionOptions::default() };
+/// let options = SimulationOptions { duration_s: 1.0, position: Some(gnss), ..Default::default() };
+/// let drive = simulate(Scenario::RoadCircuit, &options)?;
+/// assert_eq!(drive.position.len(), 10);
+/// // The antenna is not the IMU, and meta.json says where it is.
+/// assert_eq!(drive.meta.lever_arm_m(0), [-0.3, 0.0, 0.5]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionOptions {
     /// Rate, Hz; default 5.
@@ -52,6 +74,18 @@ pub struct PositionOptions {
 }
 
 /// Velocity fixes of source 0: of the IMU, in the world frame.
+///
+/// ```
+/// use inekf_client::simulate::{Scenario, SimulationOptions, VelocityOptions, simulate};
+///
+/// let options = SimulationOptions {
+///     duration_s: 1.0,
+///     velocity: Some(VelocityOptions { rate_hz: 2.0, ..VelocityOptions::default() }),
+///     ..SimulationOptions::default()
+/// };
+/// assert_eq!(simulate(Scenario::RoadCircuit, &options)?.velocity.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct VelocityOptions {
     /// Rate, Hz; default 5.
@@ -63,6 +97,21 @@ pub struct VelocityOptions {
 }
 
 /// Heading fixes of source 0: of the body x axis.
+///
+/// ```
+/// use inekf_client::simulate::{HeadingOptions, Scenario, SimulationOptions, simulate};
+///
+/// let options = SimulationOptions {
+///     duration_s: 1.0,
+///     heading: Some(HeadingOptions { sigma_rad: 0.0, ..HeadingOptions::default() }),
+///     ..SimulationOptions::default()
+/// };
+/// let fix = simulate(Scenario::StandThenDrive, &options)?.heading[0];
+/// // Without noise it is where the nose points.
+/// let nose_w = Scenario::StandThenDrive.at(0.0033).q_wb * nalgebra::Vector3::x();
+/// assert!((fix.heading_rad - nose_w.y.atan2(nose_w.x)).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeadingOptions {
     /// Rate, Hz; default 1.
@@ -77,6 +126,21 @@ pub struct HeadingOptions {
 /// drawn with the deviation of its kind, so that the dataset's initial covariance is exact. The
 /// deviations of the biases are [`SimulationOptions::gyro_bias_sigma_rps`] and
 /// [`SimulationOptions::accel_bias_sigma_mps2`], around a believed bias of zero.
+///
+/// ```
+/// use inekf_client::simulate::{InitialOptions, Scenario, SimulationOptions, simulate};
+///
+/// let options = SimulationOptions {
+///     duration_s: 0.1,
+///     initial: Some(InitialOptions::default()),
+///     ..SimulationOptions::default()
+/// };
+/// let meta = simulate(Scenario::RoadCircuit, &options)?.meta;
+/// // Variances in the order rotation, velocity, position, and the biases.
+/// let p0_diag = meta.p0_diag.expect("with the state");
+/// assert!((p0_diag[2] - 0.1 * 0.1).abs() < 1e-15 && (p0_diag[6] - 1.0).abs() < 1e-15);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct InitialOptions {
     /// Rotation about body x, y, z, rad; default 0.02, 0.02, 0.1.
@@ -111,6 +175,17 @@ impl Default for SimulationOptions {
 
 impl SimulationOptions {
     /// Without any noise or bias, fixes included; for checks of the equations alone.
+    ///
+    /// ```
+    /// use inekf_client::simulate::{Scenario, SimulationOptions, simulate};
+    ///
+    /// let options = SimulationOptions { duration_s: 1.0, ..SimulationOptions::default() }.noise_free();
+    /// let again = SimulationOptions { seed: 99, ..options.clone() };
+    /// // Nothing is left for a seed to change.
+    /// let drive = |options| simulate(Scenario::DroneLoops, options).map(|drive| (drive.imu, drive.position));
+    /// assert_eq!(drive(&options)?, drive(&again)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     #[must_use]
     pub fn noise_free(mut self) -> Self {
         for noise in [

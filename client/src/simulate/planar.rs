@@ -40,6 +40,15 @@ const SIGMAS_ODOMETRY: Vector3<f64> = Vector3::new(1e-3, 1e-2, 1e-2);
 const SIGMAS_START: Vector3<f64> = Vector3::new(0.03, 3.0, 3.0);
 
 /// Options of the planar drive.
+///
+/// ```
+/// use inekf_client::simulate::{PlanarOptions, simulate_planar};
+///
+/// let options = PlanarOptions { rate_hz: 20.0, duration_s: 2.0, ..PlanarOptions::default() };
+/// // Two sources, a fix of each at the end of every step.
+/// assert_eq!(simulate_planar(&options)?.position.len(), 2 * 40);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanarOptions {
     /// Seed of mismatches and noise; default 1. The same options give the same dataset bit for bit.
@@ -116,6 +125,19 @@ impl Pose {
 ///
 /// # Errors
 /// [`SimulationError`] if rate or duration is not positive, or there would be too many rows.
+///
+/// ```
+/// use inekf_client::dataset::Truth;
+/// use inekf_client::simulate::{PlanarOptions, simulate_planar};
+///
+/// let drive = simulate_planar(&PlanarOptions { duration_s: 1.0, ..PlanarOptions::default() })?;
+/// let Truth::Planar(truth) = &drive.truth else { unreachable!() };
+/// assert_eq!(truth[0].p_w_m, [-30.0, 30.0]);
+/// // It starts from a state that is off, with the variances that say by how much.
+/// assert!(drive.meta.initial.is_some());
+/// assert_eq!(drive.meta.p0_diag.as_deref().map(<[f64]>::len), Some(3));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn simulate_planar(options: &PlanarOptions) -> Result<Dataset, SimulationError> {
     check_length("rate_hz", options.rate_hz, options.duration_s)?;
     let mismatch = Mismatch::draw(options.seed);

@@ -15,6 +15,15 @@ use super::jet::{Jet, JetVector, constant, cross, dot, scale, sum, unit};
 const GRAVITY_MPS2: f64 = 9.80665;
 
 /// What is driven or flown.
+///
+/// ```
+/// use inekf_client::simulate::Scenario;
+///
+/// for scenario in Scenario::ALL {
+///     assert_eq!(scenario.name().parse(), Ok(scenario));
+///     assert!(!scenario.description().is_empty());
+/// }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scenario {
     /// A car on a circuit of 0.7 km with left and right bends, slopes, and changing speed.
@@ -26,6 +35,16 @@ pub enum Scenario {
 }
 
 /// Motion at one time.
+///
+/// ```
+/// use inekf_client::simulate::Scenario;
+///
+/// // Exact derivatives: position against velocity by a central difference.
+/// let (before, now, after) =
+///     (Scenario::DroneLoops.at(3.0 - 1e-4), Scenario::DroneLoops.at(3.0), Scenario::DroneLoops.at(3.0 + 1e-4));
+/// let slope = (after.p_w_m - before.p_w_m) / 2e-4;
+/// assert!((slope - now.v_w_mps).norm() < 1e-6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kinematics {
     /// Attitude, body to world.
@@ -103,6 +122,14 @@ impl FromStr for Scenario {
 }
 
 /// No scenario has this name.
+///
+/// ```
+/// use inekf_client::simulate::Scenario;
+///
+/// let error = "moon-landing".parse::<Scenario>().expect_err("none of ours");
+/// // It names those there are.
+/// assert!(error.to_string().contains("road-circuit"));
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no scenario is called `{name}`; there are road-circuit, drone-loops and stand-then-drive")]
 pub struct UnknownScenario {

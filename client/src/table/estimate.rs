@@ -36,6 +36,14 @@ const GYRO_BIAS: [&str; 3] = ["bgx", "bgy", "bgz"];
 const ACCEL_BIAS: [&str; 3] = ["bax", "bay", "baz"];
 
 /// Which columns an estimate CSV has.
+///
+/// ```
+/// use inekf_client::table::{EstimateState, Layout};
+///
+/// let state = EstimateState::Plane { theta_rad: 0.0, p_w_m: [0.0; 2] };
+/// assert_eq!(state.layout(), Layout::Plane);
+/// assert_eq!(Layout::Plane.header(), "t_ns,theta,x,y");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// SE_2(3) with both biases.
@@ -48,6 +56,13 @@ pub enum Layout {
 
 impl Layout {
     /// The header without covariance.
+    ///
+    /// ```
+    /// use inekf_client::table::Layout;
+    ///
+    /// // Quaternions x, y, z, w.
+    /// assert_eq!(Layout::Pose.header(), "t_ns,qx,qy,qz,qw,x,y,z");
+    /// ```
     pub fn header(self) -> &'static str {
         match self {
             Self::Navigation => "t_ns,qx,qy,qz,qw,vx,vy,vz,x,y,z,bgx,bgy,bgz,bax,bay,baz",
@@ -58,6 +73,13 @@ impl Layout {
 }
 
 /// The mean of one estimate.
+///
+/// ```
+/// use inekf_client::table::{EstimateState, Layout};
+///
+/// let level = EstimateState::Pose { q_wb: [0.0, 0.0, 0.0, 1.0], p_w_m: [1.0, 2.0, 3.0] };
+/// assert_eq!(level.layout(), Layout::Pose);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EstimateState {
     /// SE_2(3) with both biases.
@@ -101,6 +123,20 @@ impl EstimateState {
 }
 
 /// One row of an estimate CSV.
+///
+/// ```
+/// use inekf_client::table::{EstimateRow, EstimateState};
+/// use inekf_shared::message::triangle_index;
+///
+/// let row = EstimateRow {
+///     stamp_ns: 0,
+///     state: EstimateState::Plane { theta_rad: 0.0, p_w_m: [0.0; 2] },
+///     covariance: vec![0.01, 0.0, 0.1, 4.0, 0.0, 9.0],
+/// };
+/// // theta, x, y: the covariance of theta with y, and the variance of y.
+/// let entry = |i, j| triangle_index(i, j, 3).map(|at| row.covariance[at]);
+/// assert_eq!((entry(2, 0), entry(2, 2)), (Some(0.1), Some(9.0)));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimateRow {
     /// Stamp of the sample that was propagated, ns of the sensor clock.
@@ -112,11 +148,28 @@ pub struct EstimateRow {
 }
 
 /// Number of entries in the upper triangle of a square matrix of this size.
+///
+/// ```
+/// use inekf_client::table::estimate::triangle_len;
+///
+/// assert_eq!([3, 6, 9, 15].map(triangle_len), [6, 21, 45, 120]);
+/// ```
 pub fn triangle_len(dimension: usize) -> usize {
     dimension * (dimension + 1) / 2
 }
 
 /// Writes an estimate CSV. Give it a buffered writer: every row is several small writes.
+///
+/// ```
+/// use inekf_client::table::{EstimateState, EstimateWriter, Layout};
+///
+/// let mut writer = EstimateWriter::new(Vec::new(), Layout::Plane, Some(3))?;
+/// let state = EstimateState::Plane { theta_rad: 0.1, p_w_m: [0.0; 2] };
+/// writer.write(5, &state, &[1.0, 0.0, 0.0, 1.0, 0.0, 1.0])?;
+/// let text = String::from_utf8(writer.finish()?)?;
+/// assert!(text.starts_with("t_ns,theta,x,y,p_0_0,p_0_1,p_0_2,p_1_1,p_1_2,p_2_2\n5,0.1,"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct EstimateWriter<W> {
     out: W,
@@ -155,6 +208,17 @@ impl<W: Write> EstimateWriter<W> {
     /// # Errors
     /// `InvalidInput` if the state's layout or the covariance's length is not the header's; else
     /// what the writer reports.
+    ///
+    /// ```
+    /// use inekf_client::table::{EstimateState, EstimateWriter, Layout};
+    ///
+    /// let mut writer = EstimateWriter::new(Vec::new(), Layout::Plane, None)?;
+    /// // What is not of the table's kind is refused, and the table stays whole.
+    /// let pose = EstimateState::Pose { q_wb: [0.0, 0.0, 0.0, 1.0], p_w_m: [0.0; 3] };
+    /// assert!(writer.write(5, &pose, &[]).is_err());
+    /// assert_eq!(writer.finish()?, b"t_ns,theta,x,y\n");
+    /// # Ok::<(), std::io::Error>(())
+    /// ```
     pub fn write(
         &mut self,
         stamp_ns: u64,
@@ -210,6 +274,15 @@ impl<W: Write> EstimateWriter<W> {
 }
 
 /// A whole estimate CSV.
+///
+/// ```
+/// use inekf_client::table::{Layout, read_estimates};
+///
+/// let table = read_estimates("a.csv", &b"t_ns,theta,x,y\n1,0.5,1.0,2.0\n2,0.6,1.5,2.5\n"[..])?;
+/// assert_eq!((table.layout, table.covariance_dimension), (Layout::Plane, None));
+/// assert_eq!(table.rows.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimateTable {
     /// Which columns it has.
@@ -224,6 +297,16 @@ pub struct EstimateTable {
 ///
 /// # Errors
 /// Every fault found, with line and column (a number that is not finite is one).
+///
+/// ```
+/// use inekf_client::table::read_estimates;
+///
+/// // Every fault at once, with line and column.
+/// let faults = read_estimates("a.csv", &b"t_ns,theta,x,y\n1,inf,1.0,2.0\n2,0.6,,2.5\n"[..])
+///     .expect_err("two faults");
+/// assert_eq!(faults.len(), 2);
+/// assert!(faults.list()[0].to_string().starts_with("a.csv line 2 theta"));
+/// ```
 pub fn read_estimates(file: &str, input: impl Read) -> Result<EstimateTable, Faults> {
     let mut faults = Faults::new();
     let Some(table) = CsvTable::open(file, input, Layout::Navigation.header(), &mut faults) else {

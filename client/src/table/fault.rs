@@ -10,6 +10,13 @@ use std::fmt;
 pub const MAX_FAULTS_PER_FILE: usize = 10;
 
 /// One fault in one file.
+///
+/// ```
+/// use inekf_client::table::Fault;
+///
+/// let fault = Fault::in_file("imu.csv", "'x' is no number", "write 0.1").at_line(3).at_column("gx");
+/// assert_eq!(fault.to_string(), "imu.csv line 3 gx: 'x' is no number; write 0.1");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// The file's name, as the user knows it (`imu.csv`).
@@ -26,6 +33,13 @@ pub struct Fault {
 
 impl Fault {
     /// A fault that concerns the whole file.
+    ///
+    /// ```
+    /// use inekf_client::table::Fault;
+    ///
+    /// let fault = Fault::in_file("imu.csv", "it is empty", "add rows");
+    /// assert_eq!(fault.to_string(), "imu.csv: it is empty; add rows");
+    /// ```
     pub fn in_file(file: &str, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             file: file.to_owned(),
@@ -68,6 +82,18 @@ impl fmt::Display for Fault {
 ///
 /// `Display` is one line (the first fault and how many follow); iterate over [`list`](Self::list)
 /// to show them all.
+///
+/// ```
+/// use inekf_client::table::{Fault, Faults};
+///
+/// let mut faults = Faults::new();
+/// assert!(faults.is_empty());
+/// faults.push(Fault::in_file("imu.csv", "it is empty", "add rows"));
+/// faults.push(Fault::in_file("truth.csv", "it is empty", "add rows"));
+/// // One line for an error message; the list for who wants all.
+/// assert_eq!(faults.to_string(), "imu.csv: it is empty; add rows (and 1 more)");
+/// assert_eq!(faults.list().len(), 2);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Faults {
     list: Vec<Fault>,

@@ -19,6 +19,26 @@ const VERSION: u32 = 2;
 const MAX_BYTES: u64 = 64 * 1024;
 
 /// Whose state it is: a state is continued only by the same.
+///
+/// ```
+/// use inekf_service::checkpoint::file::{Identity, Unusable, decode, encode};
+/// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+///
+/// let car = Identity {
+///     instance: "car".to_owned(),
+///     estimator: "inekf".to_owned(),
+///     model: MODEL_IMU,
+///     dimension: 15,
+///     mismatches: String::new(),
+/// };
+/// let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
+/// let bytes = encode(&car, &state)?;
+/// assert_eq!(decode(&car, &bytes)?, state);
+/// // A state is continued by its own daemon, and by no other.
+/// let truck = Identity { instance: "truck".to_owned(), ..car };
+/// assert!(matches!(decode(&truck, &bytes), Err(Unusable::Foreign { .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Name of the instance.
@@ -43,6 +63,20 @@ struct Checkpoint {
 }
 
 /// Why a checkpoint cannot be used.
+///
+/// ```
+/// use inekf_service::checkpoint::file::{Identity, Unusable, decode};
+/// use inekf_shared::message::MODEL_IMU;
+///
+/// let car = Identity {
+///     instance: "car".to_owned(),
+///     estimator: "inekf".to_owned(),
+///     model: MODEL_IMU,
+///     dimension: 15,
+///     mismatches: String::new(),
+/// };
+/// assert!(matches!(decode(&car, b"half a fra"), Err(Unusable::Bad(_))));
+/// ```
 #[derive(Debug, thiserror::Error)]
 pub enum Unusable {
     /// The file cannot be read.
@@ -141,6 +175,27 @@ fn version_of(frame: &[u8]) -> Option<u32> {
 ///
 /// # Errors
 /// [`Unusable`], naming the reason.
+///
+/// ```
+/// use inekf_service::checkpoint::file::{Identity, encode, load, store};
+/// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+///
+/// let car = Identity {
+///     instance: "car".to_owned(),
+///     estimator: "inekf".to_owned(),
+///     model: MODEL_IMU,
+///     dimension: 15,
+///     mismatches: String::new(),
+/// };
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("car.checkpoint");
+/// // None yet is no fault.
+/// assert_eq!(load(&path, &car)?, None);
+/// let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
+/// store(&path, &encode(&car, &state)?)?;
+/// assert_eq!(load(&path, &car)?, Some(state));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn load(path: &Path, identity: &Identity) -> Result<Option<StateVector>, Unusable> {
     match fs::metadata(path) {
         // A pipe would keep the daemon waiting.
@@ -163,6 +218,19 @@ pub fn load(path: &Path, identity: &Identity) -> Result<Option<StateVector>, Unu
 ///
 /// # Errors
 /// As the system says; what was at `path` is then still there.
+///
+/// ```
+/// use inekf_service::checkpoint::file::store;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("car.checkpoint");
+/// store(&path, b"first")?;
+/// store(&path, b"second")?;
+/// // Written beside and renamed: one file, whole, whenever one looks.
+/// assert_eq!(std::fs::read(&path)?, b"second");
+/// assert_eq!(std::fs::read_dir(folder.path())?.count(), 1);
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub fn store(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let beside = beside(path);
     let written = OpenOptions::new()
@@ -195,6 +263,19 @@ pub fn store(path: &Path, bytes: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 /// As the system says.
+///
+/// ```
+/// use inekf_service::checkpoint::file::{remove, store};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("car.checkpoint");
+/// store(&path, b"a state")?;
+/// remove(&path)?;
+/// // What is not there need not be removed.
+/// remove(&path)?;
+/// assert!(!path.exists());
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),

@@ -40,6 +40,17 @@ pub struct Taker<T> {
 }
 
 /// Both sides of a buffer in which nothing has been given yet; `blank` fills the slots.
+///
+/// ```
+/// use inekf_service::checkpoint::handover::pair;
+///
+/// let (mut giver, mut taker) = pair(0);
+/// assert_eq!(taker.take(), None);
+/// giver.give(&1);
+/// giver.give(&2);
+/// // The newest, once; neither side ever waits.
+/// assert_eq!((taker.take(), taker.take()), (Some(2), None));
+/// ```
 pub fn pair<T: Copy + Send>(blank: T) -> (Giver<T>, Taker<T>) {
     let shared = Arc::new(Shared {
         slots: [blank, blank, blank].map(UnsafeCell::new),

@@ -38,6 +38,29 @@ struct Counts {
 }
 
 /// Keeps the checkpoint of a running daemon. It belongs to the estimation thread.
+///
+/// ```
+/// use inekf_service::checkpoint::file::{Identity, load};
+/// use inekf_service::checkpoint::Keeper;
+/// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+///
+/// let car = Identity {
+///     instance: "car".to_owned(),
+///     estimator: "inekf".to_owned(),
+///     model: MODEL_IMU,
+///     dimension: 15,
+///     mismatches: String::new(),
+/// };
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("car.checkpoint");
+/// let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
+/// let mut keeper = Keeper::start(path.clone(), car.clone(), 1_000_000_000, 0)?;
+/// keeper.keep(0, || Some(state));
+/// // The last one is waited for.
+/// keeper.finish(Some(state));
+/// assert_eq!(load(&path, &car)?, Some(state));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Keeper {
     giver: Giver<Option<StateVector>>,
@@ -183,6 +206,27 @@ impl Writer {
 
 /// The state of the last life, if there is a checkpoint that can be used; and whether there is one that cannot, of
 /// which the log then says why.
+///
+/// ```
+/// use inekf_service::checkpoint::file::{Identity, store};
+/// use inekf_service::checkpoint::{Unused, last_state};
+/// use inekf_shared::message::MODEL_IMU;
+///
+/// let car = Identity {
+///     instance: "car".to_owned(),
+///     estimator: "inekf".to_owned(),
+///     model: MODEL_IMU,
+///     dimension: 15,
+///     mismatches: String::new(),
+/// };
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("car.checkpoint");
+/// assert_eq!(last_state(&path, &car), Ok(None));
+/// // One that is there and is no good is another matter: health says so.
+/// store(&path, b"not a checkpoint")?;
+/// assert_eq!(last_state(&path, &car), Err(Unused));
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub fn last_state(path: &Path, identity: &Identity) -> Result<Option<StateVector>, Unused> {
     match file::load(path, identity) {
         Ok(None) => {

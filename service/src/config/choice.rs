@@ -50,6 +50,15 @@ macro_rules! choice {
 
 choice! {
     /// Which motion is estimated, and from what.
+    ///
+    /// ```
+    /// use inekf_service::config::Model;
+    ///
+    /// // As the file has it: `model = "odometry2d"`.
+    /// assert_eq!(Model::parse("odometry2d"), Some(Model::Odometry2d));
+    /// assert_eq!(Model::Odometry2d.to_string(), "odometry2d");
+    /// assert_eq!(Model::parse("boat"), None);
+    /// ```
     pub enum Model {
         /// Inertial navigation: attitude, velocity, position and biases from an IMU.
         Imu = "imu",
@@ -62,6 +71,17 @@ choice! {
 
 choice! {
     /// Which estimator runs.
+    ///
+    /// ```
+    /// use inekf_service::config::{Config, Estimator};
+    ///
+    /// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+    /// // The invariant filter, if nothing else is asked for.
+    /// assert_eq!(Config::from_toml_str(text, "example")?.estimator, Estimator::Inekf);
+    /// let smoother = format!("estimator = 'smoother'\n{text}");
+    /// assert_eq!(Config::from_toml_str(&smoother, "example")?.estimator, Estimator::Smoother);
+    /// # Ok::<(), inekf_service::config::ConfigFaults>(())
+    /// ```
     pub enum Estimator {
         /// The invariant extended Kalman filter, iterated if so configured.
         Inekf = "inekf",
@@ -116,6 +136,14 @@ choice! {
 
 choice! {
     /// On which side the estimation error is invariant.
+    ///
+    /// ```
+    /// use inekf_service::config::{Config, Invariance};
+    ///
+    /// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+    /// assert_eq!(Config::from_toml_str(text, "example")?.invariance, Some(Invariance::Left));
+    /// # Ok::<(), inekf_service::config::ConfigFaults>(())
+    /// ```
     pub enum Invariance {
         /// `chi = chi_hat exp(xi)`: the error in body coordinates.
         Left = "left",
@@ -202,6 +230,12 @@ choice! {
 
 choice! {
     /// Which interval an IMU sample speaks for.
+    ///
+    /// ```
+    /// use inekf_service::config::Hold;
+    ///
+    /// assert_eq!(Hold::parse("backward").map(Hold::as_str), Some("backward"));
+    /// ```
     pub enum Hold {
         /// The interval that ends at its stamp.
         Backward = "backward",
@@ -255,6 +289,14 @@ choice! {
 
 choice! {
     /// How the daemon waits for samples.
+    ///
+    /// ```
+    /// use inekf_service::config::{Config, WaitMode};
+    ///
+    /// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[runtime]\nwait = 'event'\n";
+    /// assert_eq!(Config::from_toml_str(text, "example")?.runtime.wait, WaitMode::Event);
+    /// # Ok::<(), inekf_service::config::ConfigFaults>(())
+    /// ```
     pub enum WaitMode {
         /// Asleep until a sender wakes it.
         Event = "event",

@@ -3,6 +3,17 @@
 use std::fmt;
 
 /// One fault of a configuration.
+///
+/// ```
+/// use inekf_service::config::Config;
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = -1\naccel_density = 2e-2\n";
+/// let faults = Config::from_toml_str(text, "example").expect_err("less than nothing");
+/// let fault = &faults.faults[0];
+/// // Key, line, value, unit and what may be.
+/// assert_eq!((fault.key.as_str(), fault.line), ("noise.gyro_density", Some(3)));
+/// assert_eq!(fault.unit, Some("rad/s/sqrt(Hz)"));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
     /// Dotted path of the key, such as `position_source[1].lever_arm_m[2]`. Empty if the fault belongs to no key:
@@ -59,6 +70,15 @@ impl fmt::Display for Fault {
 }
 
 /// All faults of one configuration, in the order of their lines.
+///
+/// ```
+/// use inekf_service::config::Config;
+///
+/// // Everything at once: what is misspelt, what is missing, what cannot be.
+/// let faults = Config::from_toml_str("modle = 'imu'\n", "example").expect_err("misspelt");
+/// assert!(faults.faults.len() >= 2);
+/// assert!(faults.to_string().starts_with("example: "));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConfigFaults {
     /// Where the configuration came from: the path of the file, or the name the caller gave.

@@ -8,6 +8,13 @@ use super::section::Section;
 pub const MAX_VEHICLES: usize = 4096;
 
 /// The vehicles of one daemon; each is an instance of its own, with topics of its own.
+///
+/// ```
+/// use inekf_service::config::Fleet;
+///
+/// // One vehicle, which the command line names, on one thread.
+/// assert_eq!(Fleet::default(), Fleet { instances: vec![], threads: 1 });
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fleet {
     /// Their names; none if the command line names the one there is.
@@ -40,6 +47,16 @@ impl Default for Fleet {
 ///
 /// # Errors
 /// A sentence that says what is wrong with it.
+///
+/// ```
+/// use inekf_service::config::expand;
+///
+/// let names: Vec<String> = expand("lead,car-{8..10}")?.iter().map(|name| name.to_string()).collect();
+/// assert_eq!(names, ["lead", "car-8", "car-9", "car-10"]);
+/// // No instance twice.
+/// assert!(expand("car-8,car-{8..10}").is_err());
+/// # Ok::<(), String>(())
+/// ```
 pub fn expand(text: &str) -> Result<Vec<Instance>, String> {
     let mut instances: Vec<Instance> = Vec::new();
     for part in text.split(',') {

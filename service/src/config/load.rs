@@ -21,6 +21,19 @@ impl Config {
     /// # Errors
     ///
     /// Every fault of the file; or one, if it cannot be read, is larger than [`MAX_FILE_BYTES`] or is not UTF-8.
+    ///
+    /// ```
+    /// use inekf_service::config::{Config, Model};
+    ///
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("car.toml");
+    /// std::fs::write(&path, "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n")?;
+    /// assert_eq!(Config::load(&path)?.model, Model::Imu);
+    /// // A file that is not there is one fault, with its path.
+    /// let missing = Config::load(folder.path().join("boat.toml")).expect_err("not there");
+    /// assert!(missing.origin.ends_with("boat.toml") && missing.faults.len() == 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn load(path: impl AsRef<Path>) -> Result<Self, ConfigFaults> {
         Ok(Self::load_with_text(path)?.0)
     }
@@ -30,6 +43,17 @@ impl Config {
     /// # Errors
     ///
     /// As [`Config::load`].
+    ///
+    /// ```
+    /// use inekf_service::config::Config;
+    ///
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("car.toml");
+    /// std::fs::write(&path, "model = 'imu' # mine\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n")?;
+    /// // To be handed out as it was written, comments and all.
+    /// assert!(Config::load_with_text(&path)?.1.contains("# mine"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn load_with_text(path: impl AsRef<Path>) -> Result<(Self, String), ConfigFaults> {
         let path = path.as_ref();
         let origin = path.display().to_string();
@@ -42,6 +66,16 @@ impl Config {
     /// # Errors
     ///
     /// Every fault of the text. If it is not TOML, only what is wrong with its syntax.
+    ///
+    /// ```
+    /// use inekf_service::config::Config;
+    ///
+    /// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+    /// assert!(Config::from_toml_str(text, "example").is_ok());
+    /// // A syntax error comes alone, for nothing behind it can be told for certain.
+    /// let faults = Config::from_toml_str("model = \n", "example").expect_err("no value");
+    /// assert_eq!(faults.faults.len(), 1);
+    /// ```
     pub fn from_toml_str(text: &str, origin_name: &str) -> Result<Self, ConfigFaults> {
         if text.len() > MAX_FILE_BYTES {
             return Err(ConfigFaults::new(origin_name, vec![too_large()]));

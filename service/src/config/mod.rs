@@ -81,6 +81,17 @@ use section::Section;
 use walk::Walk;
 
 /// Everything a daemon is told before it starts.
+///
+/// ```
+/// use inekf_service::config::{Config, Model};
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[[position_source]]\nid = 0\n";
+/// let config = Config::from_toml_str(text, "example")?;
+/// assert_eq!((config.model, config.position_sources.len()), (Model::Imu, 1));
+/// // What is not given has its default.
+/// assert!(config.smoother.is_none() && config.fleet.instances.is_empty());
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Which motion is estimated, and from what.
@@ -191,6 +202,13 @@ impl Config {
 }
 
 /// Every key the reader knows, in the order it asks for them.
+///
+/// ```
+/// use inekf_service::config::schema;
+///
+/// let gyro = schema().into_iter().find(|key| key.name == "gyro_density").expect("it is a key");
+/// assert_eq!((gyro.header.as_str(), gyro.unit), ("[noise]", Some("rad/s/sqrt(Hz)")));
+/// ```
 pub fn schema() -> Vec<KeySpec> {
     let mut walk = Walk::new("");
     Section::document(&mut walk, None, Config::read);

@@ -9,6 +9,13 @@ use std::sync::OnceLock;
 use super::fault::Fault;
 
 /// A key the reader knows, as `CONFIG.md` documents it.
+///
+/// ```
+/// use inekf_service::config::schema;
+///
+/// // Every key says what it accepts.
+/// assert!(schema().iter().all(|key| !key.allowed.is_empty() && !key.default.is_empty()));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeySpec {
     /// The header of the key's table as TOML writes it: `[initial]`, `[[position_source]]`; empty for the keys

@@ -14,6 +14,28 @@ use super::smoothing::SmoothingEngine;
 use crate::config::{Config, Invariance, Motion};
 
 /// What is done with an engine, whatever its type.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::{Engine, History, Model, Use, build};
+/// use inekf_shared::message::EstimateMessage;
+///
+/// /// Says which estimates an engine gives, whatever its type.
+/// struct WhichModel;
+///
+/// impl Use for WhichModel {
+///     type Output = u32;
+///
+///     fn with<M: Model + 'static, H: History<M> + 'static>(self, _engine: Engine<M, H>) -> u32 {
+///         M::Estimate::MODEL
+///     }
+/// }
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// let config = Config::from_toml_str(text, "example")?;
+/// assert_eq!(build(&config, WhichModel)?, inekf_shared::message::MODEL_IMU);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub trait Use {
     /// What comes of it.
     type Output;

@@ -27,6 +27,41 @@ pub const MAX_AHEAD_NS: u64 = 60_000_000_000;
 const MAX_EARLY: usize = 64;
 
 /// A model behind the wire messages, with the history H of its estimate.
+///
+/// ```
+/// use inekf::filter::Left;
+/// use inekf::model::NavState;
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::{InertialEngine, Settings};
+/// use inekf_shared::message::{EstimateSe23, ImuSample, Zero};
+///
+/// let text = "\
+/// model = 'imu'
+/// [noise]
+/// gyro_density = 3e-4
+/// accel_density = 2e-2
+/// [initial]
+/// position_m = [1.0, 2.0, 0.0]
+/// ";
+/// let config = Config::from_toml_str(text, "example")?;
+/// let run = || {
+///     let mut engine = InertialEngine::<NavState, Left, 15>::new(Settings::new(&config));
+///     let mut estimates: Vec<EstimateSe23> = Vec::new();
+///     for i in 0..300 {
+///         let mut sample = ImuSample { accel_mps2: [0.0, 0.0, 9.80665], ..ImuSample::ZERO };
+///         (sample.header.seq, sample.header.stamp_ns) = (i, (i + 1) * 10_000_000);
+///         engine.sample(&sample, 0, &mut estimates);
+///     }
+///     estimates
+/// };
+/// // At rest it levels itself, and stays where it was placed.
+/// let estimates = run();
+/// let last = estimates.last().expect("estimates came");
+/// assert!((last.p_w_m[0] - 1.0).abs() < 1e-6 && (last.p_w_m[1] - 2.0).abs() < 1e-6);
+/// // Without a clock: the same samples give the same estimates, bit for bit.
+/// assert_eq!(format!("{estimates:?}"), format!("{:?}", run()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Engine<M: Model, H = Timeline<M>> {
     model: M,

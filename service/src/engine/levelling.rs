@@ -9,6 +9,22 @@ use nalgebra::Vector3;
 const CAPACITY: usize = 4096;
 
 /// The most recent readings, over a bounded time.
+///
+/// ```
+/// use inekf::model::ImuInput;
+/// use inekf_service::engine::levelling::Levelling;
+/// use nalgebra::Vector3;
+///
+/// let mut window = Levelling::new(1_000);
+/// let reading = |force_z| ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, force_z) };
+/// window.push(0, &reading(50.0));
+/// assert!(!window.is_full());
+/// window.push(1_000, &reading(9.7));
+/// window.push(1_500, &reading(9.9));
+/// // The first has left the window, and counts no more.
+/// assert!(window.is_full());
+/// assert!((window.mean_force().expect("readings").z - 9.8).abs() < 1e-12);
+/// ```
 #[derive(Debug)]
 pub struct Levelling {
     window_ns: u64,

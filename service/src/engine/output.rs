@@ -14,6 +14,25 @@ use super::model::{Fused, Model};
 use super::tally::{Refusal, Tally};
 
 /// Where estimates go. The daemon's publishes them; a test's collects them.
+///
+/// ```
+/// use inekf_service::engine::Outbox;
+/// use inekf_shared::message::{EstimateSe2, Zero};
+///
+/// /// Only the newest is kept.
+/// struct Newest(Option<EstimateSe2>);
+///
+/// impl Outbox<EstimateSe2> for Newest {
+///     fn publish(&mut self, estimate: &mut EstimateSe2) {
+///         self.0 = Some(*estimate);
+///     }
+/// }
+///
+/// let mut newest = Newest(None);
+/// newest.publish(&mut EstimateSe2 { theta_rad: 0.1, ..EstimateSe2::ZERO });
+/// newest.publish(&mut EstimateSe2 { theta_rad: 0.2, ..EstimateSe2::ZERO });
+/// assert_eq!(newest.0.map(|estimate| estimate.theta_rad), Some(0.2));
+/// ```
 pub trait Outbox<E> {
     /// Takes one estimate, whose `published_ns` it may set. Must neither block nor allocate in the daemon.
     fn publish(&mut self, estimate: &mut E);

@@ -3,6 +3,15 @@
 use inekf_shared::message::{Counters, Header, INPUTS, REASONS, SOURCES, source_index};
 
 /// Why an input was refused; the code is that of `inekf_shared::message::REASON_*`.
+///
+/// ```
+/// use inekf_service::engine::tally::{Refusal, Tally};
+/// use inekf_shared::message::REASON_NOT_FINITE;
+///
+/// let mut tally = Tally::default();
+/// tally.refuse(Refusal(REASON_NOT_FINITE));
+/// assert_eq!((tally.counters.rejected, tally.rejected_by_reason[REASON_NOT_FINITE as usize]), (1, 1));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Refusal(pub u32);
 
@@ -19,6 +28,18 @@ struct Numbering {
 }
 
 /// What a message's number says.
+///
+/// ```
+/// use inekf_service::engine::tally::{Heard, Tally};
+/// use inekf_shared::message::{Header, INPUT_IMU, Zero};
+///
+/// let mut tally = Tally::default();
+/// let mut receive = |seq| tally.receive(INPUT_IMU, &Header { seq, epoch: 1, ..Header::ZERO });
+/// receive(0);
+/// // Two are missing before the fourth; one that was heard comes once more.
+/// assert_eq!(receive(3), Heard { lost: 2, repeated: false });
+/// assert_eq!(receive(3), Heard { lost: 0, repeated: true });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heard {
     /// Messages of its sender missing before it.
@@ -28,6 +49,18 @@ pub struct Heard {
 }
 
 /// All counters of the engine.
+///
+/// ```
+/// use inekf_service::engine::tally::Tally;
+/// use inekf_shared::message::{Header, INPUT_IMU, Zero};
+///
+/// let mut tally = Tally::default();
+/// for (epoch, seq) in [(1, 0), (1, 1), (2, 0), (2, 5)] {
+///     tally.receive(INPUT_IMU, &Header { seq, epoch, ..Header::ZERO });
+/// }
+/// // A sender that has started anew counts anew.
+/// assert_eq!((tally.received[INPUT_IMU], tally.counters.lost), (4, 4));
+/// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
     /// The counters that estimates and health carry.
@@ -86,6 +119,17 @@ impl Tally {
     }
 
     /// Notes that a fix of this time, topic and source was fused.
+    ///
+    /// ```
+    /// use inekf_service::engine::tally::Tally;
+    /// use inekf_shared::message::INPUT_POSITION;
+    ///
+    /// let mut tally = Tally::default();
+    /// tally.fused(INPUT_POSITION, 0, 500);
+    /// // A late one is fused too, and is not the newest.
+    /// tally.fused(INPUT_POSITION, 0, 300);
+    /// assert_eq!(tally.last_fix_stamp_ns, 500);
+    /// ```
     pub fn fused(&mut self, input: usize, source: u32, stamp_ns: u64) {
         self.last_fix_stamp_ns = self.last_fix_stamp_ns.max(stamp_ns);
         if let Some(newest) =

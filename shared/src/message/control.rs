@@ -30,6 +30,13 @@ pub const CONTROL_CONFIG: u32 = 9;
 pub const CONTROL_TAKE: u32 = 10;
 
 /// Name of a kind of request; `"unknown"` for a code that is not defined.
+///
+/// ```
+/// use inekf_shared::message::{CONTROL_SET_STATE, control_kind_name};
+///
+/// assert_eq!(control_kind_name(CONTROL_SET_STATE), "set-state");
+/// assert_eq!(control_kind_name(99), "unknown");
+/// ```
 #[must_use]
 pub const fn control_kind_name(code: u32) -> &'static str {
     match code {
@@ -53,6 +60,12 @@ pub const CONTROL_OK: u32 = 0;
 pub const CONTROL_REFUSED: u32 = 1;
 
 /// Name of a status; `"unknown"` for a code that is not defined.
+///
+/// ```
+/// use inekf_shared::message::{CONTROL_REFUSED, control_status_name};
+///
+/// assert_eq!(control_status_name(CONTROL_REFUSED), "refused");
+/// ```
 #[must_use]
 pub const fn control_status_name(code: u32) -> &'static str {
     match code {
@@ -78,6 +91,24 @@ pub const MODES: usize = 9;
 ///
 /// In the plane `q_wb` turns about z, `p_w_m` is `(x, y, 0)` and `dimension` is 3. The covariance is that of the
 /// left-invariant error, as in the estimates.
+///
+/// ```
+/// use inekf_shared::message::{MODEL_ODOMETRY_2D, StateVector, Zero, triangle_index};
+///
+/// // A start in the plane, heading north, known to 0.1 rad and 2 m.
+/// let half_turn_rad = 90_f64.to_radians() / 2.0;
+/// let mut start = StateVector {
+///     model: MODEL_ODOMETRY_2D,
+///     dimension: 3,
+///     q_wb: [0.0, 0.0, half_turn_rad.sin(), half_turn_rad.cos()],
+///     ..StateVector::ZERO
+/// };
+/// for (index, sigma) in [0.1, 2.0, 2.0].into_iter().enumerate() {
+///     let at = triangle_index(index, index, 3).expect("on the diagonal");
+///     start.covariance[at] = sigma * sigma;
+/// }
+/// assert_eq!(start.covariance[..6], [0.1 * 0.1, 0.0, 0.0, 4.0, 0.0, 4.0]);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.StateVector.v2")]
@@ -125,6 +156,19 @@ layout! {
 }
 
 /// What a client asks of the daemon.
+///
+/// ```
+/// use inekf_shared::message::{CONTROL_CONFIG, ControlRequest};
+///
+/// // The configuration's text from byte 256 on.
+/// let request = ControlRequest {
+///     kind: CONTROL_CONFIG,
+///     argument: 256,
+///     request_id: 2,
+///     ..ControlRequest::default()
+/// };
+/// assert_eq!(request.state.dimension, 0);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.ControlRequest.v3")]
@@ -152,6 +196,14 @@ layout! {
 }
 
 /// What the daemon answers.
+///
+/// ```
+/// use inekf_shared::message::{CONTROL_REFUSED, ControlResponse};
+///
+/// let mut response = ControlResponse { request_id: 7, status: CONTROL_REFUSED, ..Default::default() };
+/// response.set_reason("the model has no smoother");
+/// assert_eq!(response.reason(), "the model has no smoother");
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.ControlResponse.v5")]
@@ -194,6 +246,16 @@ layout! {
 
 impl ControlResponse {
     /// Writes the text of a refusal, cut at a character boundary if it exceeds [`REASON_TEXT_LEN`] bytes.
+    ///
+    /// ```
+    /// use inekf_shared::message::{ControlResponse, REASON_TEXT_LEN};
+    ///
+    /// let mut response = ControlResponse::default();
+    /// // Two bytes a letter: what does not fit is cut between letters.
+    /// response.set_reason(&"ä".repeat(200));
+    /// assert_eq!(response.reason().len(), REASON_TEXT_LEN);
+    /// assert!(response.reason().chars().all(|letter| letter == 'ä'));
+    /// ```
     pub fn set_reason(&mut self, text: &str) {
         let mut end = text.len().min(REASON_TEXT_LEN);
         while !text.is_char_boundary(end) {
@@ -205,6 +267,19 @@ impl ControlResponse {
     }
 
     /// Writes a page of the configuration's text: what there is of it from `offset` on and fits.
+    ///
+    /// ```
+    /// use inekf_shared::message::ControlResponse;
+    ///
+    /// let text = "model = 'imu'";
+    /// let mut response = ControlResponse::default();
+    /// response.set_page(text, 8);
+    /// // What there is from there on, and how long the whole is.
+    /// assert_eq!((response.page(), response.config_len), (&b"'imu'"[..], 13));
+    /// // Beyond the end there is nothing, and no panic.
+    /// response.set_page(text, 500);
+    /// assert!(response.page().is_empty());
+    /// ```
     pub fn set_page(&mut self, text: &str, offset: usize) {
         let rest = text.as_bytes().get(offset..).unwrap_or_default();
         let len = rest.len().min(REASON_TEXT_LEN);
@@ -215,6 +290,14 @@ impl ControlResponse {
     }
 
     /// The page of the configuration's text that a response to [`CONTROL_CONFIG`] holds.
+    ///
+    /// ```
+    /// use inekf_shared::message::ControlResponse;
+    ///
+    /// // A faulty writer's length is cut to the field.
+    /// let response = ControlResponse { reason_len: u32::MAX, ..ControlResponse::default() };
+    /// assert_eq!(response.page().len(), inekf_shared::message::REASON_TEXT_LEN);
+    /// ```
     #[must_use]
     pub fn page(&self) -> &[u8] {
         &self.reason[..(self.reason_len as usize).min(REASON_TEXT_LEN)]
@@ -222,6 +305,15 @@ impl ControlResponse {
 
     /// The text of a refusal. Whatever a faulty writer left, this is text: the length is cut to the field, and what
     /// is not UTF-8 ends it.
+    ///
+    /// ```
+    /// use inekf_shared::message::ControlResponse;
+    ///
+    /// // Whatever a faulty writer left, this is text: what is none ends it.
+    /// let mut response = ControlResponse { reason_len: 3, ..ControlResponse::default() };
+    /// response.reason[..3].copy_from_slice(b"ok\xff");
+    /// assert_eq!(response.reason(), "ok");
+    /// ```
     #[must_use]
     pub fn reason(&self) -> &str {
         let used = (self.reason_len as usize).min(REASON_TEXT_LEN);

@@ -51,6 +51,15 @@ pub const ZERO_VELOCITY_SOURCE: u32 = u32::MAX - 1;
 pub const NO_MODE: u32 = u32::MAX;
 
 /// Name of one estimate flag; `"unknown"` for anything else, a combination of flags included.
+///
+/// ```
+/// use inekf_shared::message::{ESTIMATE_FLAGS, ESTIMATE_UPDATED, estimate_flag_name};
+///
+/// assert_eq!(estimate_flag_name(ESTIMATE_UPDATED), "updated");
+/// // All that are set in some flags, one by one.
+/// let names = (0..32).map(|bit| 1 << bit).filter(|flag| ESTIMATE_FLAGS & flag != 0).map(estimate_flag_name);
+/// assert!(names.into_iter().all(|name| name != "unknown"));
+/// ```
 #[must_use]
 pub const fn estimate_flag_name(flag: u32) -> &'static str {
     match flag {
@@ -66,6 +75,12 @@ pub const fn estimate_flag_name(flag: u32) -> &'static str {
 }
 
 /// Name of a model as a configuration file spells it; `"unknown"` for a code that is not defined.
+///
+/// ```
+/// use inekf_shared::message::{MODEL_ODOMETRY_2D, model_name};
+///
+/// assert_eq!(model_name(MODEL_ODOMETRY_2D), "odometry2d");
+/// ```
 #[must_use]
 pub const fn model_name(code: u32) -> &'static str {
     match code {
@@ -77,6 +92,14 @@ pub const fn model_name(code: u32) -> &'static str {
 }
 
 /// What became of the inputs since the daemon's start.
+///
+/// ```
+/// use inekf_shared::message::{Counters, Zero};
+///
+/// // Every fix that came is counted once, as one of these; what never came is `lost`.
+/// let counters = Counters { accepted: 95, gated: 3, late: 2, ..Counters::ZERO };
+/// assert_eq!(counters.accepted + counters.gated + counters.late + counters.rejected, 100);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.Counters.v2")]
@@ -102,6 +125,21 @@ layout! {
 }
 
 /// What every estimate starts with.
+///
+/// ```
+/// use inekf_shared::message::{ESTIMATE_PROPAGATED, ESTIMATE_RESET, EstimateHead, NO_SOURCE};
+///
+/// let head = EstimateHead {
+///     sent_ns: 1_000,
+///     received_ns: 1_400,
+///     published_ns: 2_100,
+///     flags: ESTIMATE_PROPAGATED,
+///     ..EstimateHead::UNSTARTED
+/// };
+/// // From the sensor's send to the estimate's publication, one clock for all processes of a host.
+/// assert_eq!(head.published_ns - head.sent_ns, 1_100);
+/// assert!(head.flags & ESTIMATE_RESET == 0 && head.source == NO_SOURCE && head.nis[0].is_nan());
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.EstimateHead.v2")]
@@ -161,6 +199,28 @@ impl EstimateHead {
 }
 
 /// Estimate of the IMU model: pose and velocity on SE_2(3), biases beside it.
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe23, NAV_DIM, Zero, triangle_index};
+///
+/// let mut estimate = EstimateSe23::ZERO;
+/// // Rotation, velocity, position, gyro bias, accelerometer bias: the position begins at 6.
+/// let along = triangle_index(6, 6, NAV_DIM).expect("in the triangle");
+/// estimate.covariance[along] = 0.25;
+/// // Half a metre along the body's x axis: the error is in body coordinates.
+/// assert_eq!(estimate.covariance[along].sqrt(), 0.5);
+/// assert_eq!(size_of::<EstimateSe23>(), 1288);
+/// ```
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe2, Zero, triangle_index};
+///
+/// let mut estimate = EstimateSe2::ZERO;
+/// // theta, x, y.
+/// let heading = triangle_index(0, 0, 3).expect("in the triangle");
+/// estimate.covariance[heading] = 0.04;
+/// assert_eq!(estimate.covariance[0].sqrt(), 0.2);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.EstimateSe23.v2")]
@@ -191,6 +251,14 @@ layout! {
 }
 
 /// Estimate of the spatial odometry model: a pose on SE(3).
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe3, SE3_TRI, Zero, triangle_index};
+///
+/// // Rotation, then position: the last entry is the variance along the body's z axis.
+/// assert_eq!(triangle_index(5, 5, 6), Some(SE3_TRI - 1));
+/// assert_eq!(EstimateSe3::ZERO.covariance.len(), SE3_TRI);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.EstimateSe3.v2")]
@@ -243,6 +311,20 @@ layout! {
 }
 
 /// The payload of the `estimate` topic under one model.
+///
+/// ```
+/// use inekf_shared::message::{EstimateMessage, EstimateSe2, EstimateSe23, MODEL_IMU, Zero};
+///
+/// /// Whatever the model.
+/// fn is_new<E: EstimateMessage>(estimate: &E, last_seq: u64) -> bool {
+///     estimate.head().estimate_seq > last_seq
+/// }
+///
+/// let mut estimate = EstimateSe2::ZERO;
+/// estimate.head_mut().estimate_seq = 5;
+/// assert!(is_new(&estimate, 4) && !is_new(&estimate, 5));
+/// assert_eq!(EstimateSe23::MODEL, MODEL_IMU);
+/// ```
 pub trait EstimateMessage: Message {
     /// The `MODEL_*` code whose estimate this is.
     const MODEL: u32;

@@ -9,6 +9,16 @@ use super::layout::layout;
 ///
 /// iceoryx2's own header has neither a number nor a time and an overflow of a buffer is silent, so both are here:
 /// within one `epoch`, a step of `seq` by more than one is that many messages lost, less one.
+///
+/// ```
+/// use inekf_shared::message::{Header, Zero};
+///
+/// let before = Header { seq: 7, epoch: 1, ..Header::ZERO };
+/// let now = Header { seq: 10, epoch: 1, ..Header::ZERO };
+/// // Two messages were lost; a new epoch would have begun anew instead.
+/// assert_eq!(now.seq - before.seq - 1, 2);
+/// assert_eq!(now.epoch, before.epoch);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.Header.v1")]

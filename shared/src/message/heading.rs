@@ -7,6 +7,18 @@ use super::Header;
 use super::layout::layout;
 
 /// A measured heading of one source.
+///
+/// ```
+/// use inekf_shared::message::{HeadingFix, Message, Zero};
+///
+/// // North, known to two degrees.
+/// let fix = HeadingFix {
+///     heading_rad: 90_f64.to_radians(),
+///     sigma_rad: 2_f64.to_radians(),
+///     ..HeadingFix::ZERO
+/// };
+/// assert_eq!(HeadingFix::from_bytes(fix.as_bytes()), Some(fix));
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.HeadingFix.v1")]

@@ -20,6 +20,13 @@ pub const STATE_STALE: u32 = 5;
 pub const STATE_PAUSED: u32 = 6;
 
 /// Name of a state; `"unknown"` for a code that is not defined.
+///
+/// ```
+/// use inekf_shared::message::{STATE_DEGRADED, state_name};
+///
+/// assert_eq!(state_name(STATE_DEGRADED), "degraded");
+/// assert_eq!(state_name(0), "unknown");
+/// ```
 #[must_use]
 pub const fn state_name(code: u32) -> &'static str {
     match code {
@@ -45,6 +52,12 @@ pub const WAITING_FOR_LEVEL: u32 = 3;
 pub const WAITING_FOR_REQUEST: u32 = 4;
 
 /// Name of what the daemon waits for; `"unknown"` for a code that is not defined.
+///
+/// ```
+/// use inekf_shared::message::{WAITING_FOR_POSITION, waiting_for_name};
+///
+/// assert_eq!(waiting_for_name(WAITING_FOR_POSITION), "position");
+/// ```
 #[must_use]
 pub const fn waiting_for_name(code: u32) -> &'static str {
     match code {
@@ -86,6 +99,14 @@ pub const REASON_BAD_DIMENSION: u32 = 10;
 pub const REASON_NOT_READY: u32 = 11;
 
 /// Name of a reason for rejection; `"unknown"` for a code that is not defined.
+///
+/// ```
+/// use inekf_shared::message::{REASONS, reason_name};
+///
+/// // As many have a name as there are reasons; the other slots are for those to come.
+/// let named = (0..REASONS as u32).filter(|code| reason_name(*code) != "unknown");
+/// assert_eq!(named.count(), 12);
+/// ```
 #[must_use]
 pub const fn reason_name(code: u32) -> &'static str {
     match code {
@@ -122,6 +143,13 @@ pub const INPUT_VELOCITY: usize = 4;
 pub const INPUT_HEADING: usize = 5;
 
 /// Name of the input topic at an index of [`Health::received`]; `"unknown"` beyond them.
+///
+/// ```
+/// use inekf_shared::message::{INPUT_VELOCITY, INPUTS, input_name};
+///
+/// assert_eq!(input_name(INPUT_VELOCITY), "velocity");
+/// assert_eq!(input_name(INPUTS), "unknown");
+/// ```
 #[must_use]
 pub const fn input_name(index: usize) -> &'static str {
     match index {
@@ -141,6 +169,16 @@ pub const SOURCES: usize = 3 * MAX_SOURCES;
 
 /// Place of a source of the topic with the `INPUT_*` index `input` in [`Health::fused_stamp_ns`] and
 /// [`Health::delivered_ns`]: `8 (input - INPUT_POSITION) + source`; `None` if there is no such source.
+///
+/// ```
+/// use inekf_shared::message::{INPUT_HEADING, INPUT_IMU, INPUT_POSITION, MAX_SOURCES, SOURCES, source_index};
+///
+/// assert_eq!(source_index(INPUT_POSITION, 2), Some(2));
+/// // The last place of all.
+/// assert_eq!(source_index(INPUT_HEADING, MAX_SOURCES as u32 - 1), Some(SOURCES - 1));
+/// // An IMU has no sources.
+/// assert_eq!(source_index(INPUT_IMU, 0), None);
+/// ```
 #[must_use]
 pub const fn source_index(input: usize, source: u32) -> Option<usize> {
     if input < INPUT_POSITION || input >= INPUTS || source as usize >= MAX_SOURCES {
@@ -157,6 +195,17 @@ pub const HEALTH_NOT_RESUMED: u32 = 2;
 pub const HEALTH_FLAGS: u32 = HEALTH_RESUMED | HEALTH_NOT_RESUMED;
 
 /// How the daemon is, about once a second.
+///
+/// ```
+/// use inekf_shared::message::{Health, INPUT_POSITION, Zero, source_index};
+///
+/// let gnss = source_index(INPUT_POSITION, 0).expect("there is such a source");
+/// let mut health = Health { stamp_ns: 9_000, last_imu_stamp_ns: 700, ..Health::ZERO };
+/// health.delivered_ns[gnss] = 8_000;
+/// // It was heard 1 us ago by the host's clock, and nothing of it has been fused.
+/// assert_eq!(health.delivery_age_ns(health.delivered_ns[gnss]), Some(1_000));
+/// assert_eq!(health.fix_age_ns(health.fused_stamp_ns[gnss]), None);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.Health.v4")]
@@ -213,6 +262,15 @@ pub struct Health {
 impl Health {
     /// Sensor time from a stamp of this message to the last accepted sample, nanoseconds: the age of an observation.
     /// `None` for a stamp of 0: there was none.
+    ///
+    /// ```
+    /// use inekf_shared::message::{Health, Zero};
+    ///
+    /// let health = Health { last_imu_stamp_ns: 5_000, ..Health::ZERO };
+    /// assert_eq!(health.fix_age_ns(4_000), Some(1_000));
+    /// // A fix ahead of the samples is not old at all; none is none.
+    /// assert_eq!((health.fix_age_ns(6_000), health.fix_age_ns(0)), (Some(0), None));
+    /// ```
     #[must_use]
     pub const fn fix_age_ns(&self, stamp_ns: u64) -> Option<u64> {
         if stamp_ns == 0 {
@@ -222,6 +280,14 @@ impl Health {
     }
 
     /// Time from a delivery to this message, nanoseconds of CLOCK_MONOTONIC. `None` for 0: there was none.
+    ///
+    /// ```
+    /// use inekf_shared::message::{Health, Zero};
+    ///
+    /// let health = Health { stamp_ns: 5_000, last_delivery_ns: 3_500, ..Health::ZERO };
+    /// assert_eq!(health.delivery_age_ns(health.last_delivery_ns), Some(1_500));
+    /// assert_eq!(health.delivery_age_ns(0), None);
+    /// ```
     #[must_use]
     pub const fn delivery_age_ns(&self, delivered_ns: u64) -> Option<u64> {
         if delivered_ns == 0 {

@@ -7,6 +7,14 @@ use super::Header;
 use super::layout::layout;
 
 /// One sample of a gyroscope and an accelerometer.
+///
+/// ```
+/// use inekf_shared::message::{ImuSample, Message, Zero};
+///
+/// let at_rest = ImuSample { accel_mps2: [0.0, 0.0, 9.80665], ..ImuSample::ZERO };
+/// // The size and the name under which every language attaches.
+/// assert_eq!((at_rest.as_bytes().len(), ImuSample::TYPE_NAME), (80, "inekf.ImuSample.v1"));
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.ImuSample.v1")]

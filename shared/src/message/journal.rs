@@ -32,6 +32,14 @@ pub const JOURNAL_SETTLE: u32 = 8;
 pub const JOURNAL_RESUME: u32 = 9;
 
 /// Name of a kind of entry; `"unknown"` for a code that is not defined.
+///
+/// ```
+/// use inekf_shared::message::{INPUT_HEADING, JOURNAL_HEADING, input_name, journal_kind_name};
+///
+/// // The kinds of the inputs are one more than their index.
+/// assert_eq!(JOURNAL_HEADING as usize, INPUT_HEADING + 1);
+/// assert_eq!(journal_kind_name(JOURNAL_HEADING), input_name(INPUT_HEADING));
+/// ```
 #[must_use]
 pub const fn journal_kind_name(code: u32) -> &'static str {
     match code {
@@ -64,6 +72,16 @@ const _: () = {
 };
 
 /// Something that the engine took.
+///
+/// ```
+/// use inekf_shared::message::{HeadingFix, ImuSample, JOURNAL_IMU, JournalEntry, Message, Zero};
+///
+/// let sample = ImuSample { gyro_rps: [0.0, 0.0, 0.3], ..ImuSample::ZERO };
+/// let entry = JournalEntry::new(12, 40, JOURNAL_IMU, sample.as_bytes());
+/// assert_eq!(entry.read::<ImuSample>(), Some(sample));
+/// // It is none of another size.
+/// assert_eq!(entry.read::<HeadingFix>(), None);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.JournalEntry.v2")]
@@ -89,6 +107,13 @@ layout! {
 
 impl JournalEntry {
     /// The entry of this kind with the bytes of a message, as far as they fit.
+    ///
+    /// ```
+    /// use inekf_shared::message::{JOURNAL_SETTLE, JournalEntry};
+    ///
+    /// let entry = JournalEntry::new(3, 7, JOURNAL_SETTLE, &[]);
+    /// assert_eq!((entry.index, entry.estimates, entry.size), (3, 7, 0));
+    /// ```
     #[must_use]
     pub fn new(index: u64, estimates: u64, kind: u32, message: &[u8]) -> Self {
         let size = message.len().min(JOURNAL_PAYLOAD_LEN);
@@ -104,12 +129,30 @@ impl JournalEntry {
     }
 
     /// The bytes of the message; whatever a faulty writer left as size, no more than there are.
+    ///
+    /// ```
+    /// use inekf_shared::message::{JOURNAL_IMU, JOURNAL_PAYLOAD_LEN, JournalEntry};
+    ///
+    /// let mut entry = JournalEntry::new(0, 0, JOURNAL_IMU, &[1, 2, 3]);
+    /// assert_eq!(entry.message(), [1, 2, 3]);
+    /// // A faulty writer's size is cut to what there is.
+    /// entry.size = u32::MAX;
+    /// assert_eq!(entry.message().len(), JOURNAL_PAYLOAD_LEN);
+    /// ```
     #[must_use]
     pub fn message(&self) -> &[u8] {
         &self.payload[..(self.size as usize).min(JOURNAL_PAYLOAD_LEN)]
     }
 
     /// The message, if the entry has one of this type.
+    ///
+    /// ```
+    /// use inekf_shared::message::{HeadingFix, JOURNAL_HEADING, JournalEntry, Message, Zero};
+    ///
+    /// let fix = HeadingFix { heading_rad: 0.5, ..HeadingFix::ZERO };
+    /// let entry = JournalEntry::new(0, 0, JOURNAL_HEADING, fix.as_bytes());
+    /// assert_eq!(entry.read(), Some(fix));
+    /// ```
     #[must_use]
     pub fn read<M: Message>(&self) -> Option<M> {
         M::from_bytes(self.message())

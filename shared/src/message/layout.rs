@@ -11,6 +11,14 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// A value whose bytes are all zero. Implemented for the numbers a message may hold, arrays of them, and messages.
+///
+/// ```
+/// use inekf_shared::message::{FieldType, Health, Message, Zero};
+///
+/// assert_eq!(<[u32; 3]>::ZERO, [0, 0, 0]);
+/// assert_eq!(<[u32; 3]>::TYPE, FieldType::Array(&FieldType::U32, 3));
+/// assert!(Health::ZERO.as_bytes().iter().all(|byte| *byte == 0));
+/// ```
 pub trait Zero: Copy {
     /// The value whose bytes are all zero.
     const ZERO: Self;
@@ -41,6 +49,13 @@ impl<T: Zero, const N: usize> Zero for [T; N] {
 }
 
 /// What a field of a message holds.
+///
+/// ```
+/// use inekf_shared::message::{FieldType, ImuSample, Message};
+///
+/// let gyro = ImuSample::WIRE.fields[1];
+/// assert_eq!((gyro.name, gyro.holds), ("gyro_rps", FieldType::Array(&FieldType::F64, 3)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldType {
     /// An octet.
@@ -58,6 +73,13 @@ pub enum FieldType {
 }
 
 /// One field of a message.
+///
+/// ```
+/// use inekf_shared::message::{HeadingFix, Message};
+///
+/// let heading = HeadingFix::WIRE.fields.iter().find(|field| field.name == "heading_rad");
+/// assert_eq!(heading.map(|field| field.offset), Some(40));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Its name.
@@ -69,6 +91,16 @@ pub struct Field {
 }
 
 /// The layout of a message, for writing it down in other languages.
+///
+/// ```
+/// use inekf_shared::message::LAYOUTS;
+///
+/// for layout in LAYOUTS {
+///     // A name with its version; fields in order, the first at the beginning.
+///     assert!(layout.type_name.starts_with(&format!("inekf.{}.v", layout.name)));
+///     assert!(layout.fields[0].offset == 0 && layout.fields.is_sorted_by_key(|field| field.offset));
+/// }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Name of the struct.
@@ -84,6 +116,18 @@ pub struct Layout {
 }
 
 /// A message of the wire contract: fixed layout, any bytes valid, free of padding.
+///
+/// ```
+/// use inekf_shared::message::{ImuSample, Message, Zero};
+///
+/// let sample = ImuSample { gyro_rps: [0.1, 0.2, 0.3], ..ImuSample::ZERO };
+/// // The bytes as they lie in shared memory, and back.
+/// let bytes = sample.as_bytes();
+/// assert_eq!(bytes[32..40], 0.1_f64.to_ne_bytes());
+/// assert_eq!(ImuSample::from_bytes(bytes), Some(sample));
+/// // Too few of them are no message.
+/// assert_eq!(ImuSample::from_bytes(&bytes[1..]), None);
+/// ```
 pub trait Message:
     Zero + ZeroCopySend + Debug + PartialEq + Serialize + DeserializeOwned + 'static
 {

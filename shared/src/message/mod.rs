@@ -110,6 +110,15 @@ pub const SE2_TRI: usize = 6;
 ///
 /// The order of `row` and `col` does not matter, the matrix being symmetric.
 /// `None` if either lies outside the matrix.
+///
+/// ```
+/// use inekf_shared::message::{NAV_DIM, NAV_TRI, triangle_index};
+///
+/// assert_eq!(triangle_index(0, 2, 3), Some(2));
+/// assert_eq!(triangle_index(2, 0, 3), triangle_index(0, 2, 3));
+/// assert_eq!(triangle_index(NAV_DIM - 1, NAV_DIM - 1, NAV_DIM), Some(NAV_TRI - 1));
+/// assert_eq!(triangle_index(0, 3, 3), None);
+/// ```
 #[must_use]
 pub const fn triangle_index(row: usize, col: usize, dim: usize) -> Option<usize> {
     let (low, high) = if row <= col { (row, col) } else { (col, row) };

@@ -12,6 +12,21 @@ pub const NOISE_PER_SAMPLE: u32 = 2;
 
 /// Process noise of either kind of motion. A number that the motion does not have is NaN, and so is one that is not
 /// given and has a default.
+///
+/// ```
+/// use inekf_shared::message::{NOISE_DENSITY, ProcessNoise};
+///
+/// let noise = ProcessNoise {
+///     form: NOISE_DENSITY,
+///     rotation: 3e-4,    // rad/s/sqrt(Hz)
+///     translation: 2e-2, // m/s^2/sqrt(Hz)
+///     ..ProcessNoise::UNGIVEN
+/// };
+/// // At 200 Hz a sample of the gyroscope is good to 0.0042 rad/s.
+/// assert!((noise.rotation * 200_f64.sqrt() - 0.00424).abs() < 1e-5);
+/// // What is not given is not a number.
+/// assert!(noise.gyro_bias_walk.is_nan());
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.ProcessNoise.v1")]

@@ -7,6 +7,16 @@ use super::Header;
 use super::layout::layout;
 
 /// A planar increment: forward, left, counter-clockwise.
+///
+/// ```
+/// use inekf_shared::message::{Odometry2d, Zero};
+///
+/// // Half a metre forwards and a little to the left while turning left.
+/// let row = Odometry2d { dtheta_rad: 0.1, translation_m: [0.5, 0.025], ..Odometry2d::ZERO };
+/// // On an arc the way points half the turn to the left.
+/// let direction_rad = row.translation_m[1].atan2(row.translation_m[0]);
+/// assert!((direction_rad - row.dtheta_rad / 2.0).abs() < 1e-4);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.Odometry2d.v1")]
@@ -26,6 +36,12 @@ layout! {
 }
 
 /// A spatial increment.
+///
+/// ```
+/// use inekf_shared::message::{Message, Odometry3d};
+///
+/// assert_eq!(Odometry3d::FIELDS, [("header", 0), ("rotation_rad", 32), ("translation_m", 56)]);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.Odometry3d.v1")]

@@ -7,6 +7,21 @@ use super::Header;
 use super::layout::layout;
 
 /// A measured position of one source (an antenna, say; its lever arm is in the daemon's configuration).
+///
+/// ```
+/// use inekf_shared::message::{PositionFix, Zero};
+///
+/// // A fix in the plane: z and its row and column of the covariance do not count.
+/// let (east_m, north_m) = (2.0_f64, 3.0_f64);
+/// let fix = PositionFix {
+///     dimension: 2,
+///     position_w_m: [100.0, 50.0, 0.0],
+///     covariance_w_m2: [east_m * east_m, 0.0, 0.0, 0.0, north_m * north_m, 0.0, 0.0, 0.0, 0.0],
+///     ..PositionFix::ZERO
+/// };
+/// // Row-major, m^2.
+/// assert_eq!((fix.covariance_w_m2[0], fix.covariance_w_m2[4]), (4.0, 9.0));
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.PositionFix.v1")]

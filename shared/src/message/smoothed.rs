@@ -13,6 +13,16 @@ pub const SMOOTHED_CUT: u32 = 1;
 pub const SMOOTHED_FLAGS: u32 = SMOOTHED_CUT;
 
 /// The last estimate of a state that has left the window, or the present one of a state in it.
+///
+/// ```
+/// use inekf_shared::message::{SMOOTHED_CUT, SmoothedState, Zero};
+///
+/// let left = SmoothedState { index: 41, ..SmoothedState::ZERO };
+/// let answer = SmoothedState { request_id: 3, index: 0, count: 10, ..SmoothedState::ZERO };
+/// // Its last estimate, after 41 others; and the oldest of the ten that are in the window now.
+/// assert!(left.request_id == 0 && left.flags & SMOOTHED_CUT == 0);
+/// assert!(answer.request_id != 0 && answer.index < answer.count);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.SmoothedState.v2")]

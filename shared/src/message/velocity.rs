@@ -7,6 +7,20 @@ use super::Header;
 use super::layout::layout;
 
 /// A measured velocity of one source.
+///
+/// ```
+/// use inekf_shared::message::{VelocityFix, Zero};
+///
+/// // Northwards at 3 m/s, whatever the attitude; 0.1 m/s on each axis.
+/// let variance = 0.1_f64 * 0.1;
+/// let fix = VelocityFix {
+///     velocity_w_mps: [0.0, 3.0, 0.0],
+///     covariance_w: [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance],
+///     ..VelocityFix::ZERO
+/// };
+/// // A flag that is not defined would have it refused.
+/// assert_eq!(fix.flags, 0);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.VelocityFix.v1")]

@@ -1,6 +1,22 @@
 //! What can go wrong while opening, named by service, with its remedy.
 
 /// A node, a service or a port could not be opened.
+///
+/// ```
+/// use inekf_shared::transport::TransportError;
+///
+/// // Every error names the thing and the remedy.
+/// let error = TransportError::Full {
+///     service: "inekf/car/control".to_owned(),
+///     port: "server",
+///     limit: 1,
+///     holders: vec![4711],
+/// };
+/// assert_eq!(
+///     error.to_string(),
+///     "inekf/car/control has no place for another server: 1 at a time, held by process 4711; stop one of them"
+/// );
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TransportError {
     /// An environment variable holds what cannot be used.

@@ -18,6 +18,19 @@ pub(super) const SHARED_MEMORY: &str = "/dev/shm";
 const CLEANUP_WITHIN: Duration = Duration::from_secs(5);
 
 /// A process's access to shared memory, as others see it.
+///
+/// ```
+/// use inekf_shared::transport::{self, inspect};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let mine = &inspect::nodes(&config)?[0];
+/// assert_eq!((mine.process, mine.alive), (std::process::id(), true));
+/// # drop(node);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeReport {
     /// Name the process gave it; empty if its details cannot be read.
@@ -55,6 +68,19 @@ fn each_node(
 ///
 /// # Errors
 /// [`TransportError::Internal`] if they cannot be listed.
+///
+/// ```
+/// use inekf_shared::transport::{self, inspect};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// assert!(inspect::nodes(&config)?.is_empty());
+/// let node = transport::open_node_with("my-robot", &config)?;
+/// assert_eq!(inspect::nodes(&config)?[0].name, "my-robot");
+/// # drop(node);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn nodes(config: &Config) -> Result<Vec<NodeReport>, TransportError> {
     let mut reports = Vec::new();
     each_node(config, |state| {
@@ -139,6 +165,24 @@ pub(super) fn remove_dead_nodes(config: &Config) -> Result<(usize, usize), Trans
 ///
 /// # Errors
 /// They cannot be listed.
+///
+/// ```
+/// use inekf_shared::message::ImuSample;
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport::{self, inspect};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let publisher = transport::input::<ImuSample>(&node, &Instance::default())?.publisher()?;
+/// // Room for thousands of samples of 80 bytes each.
+/// let bytes: u64 = inspect::shared_memory_files(&config)?.iter().map(|(_, bytes)| bytes).sum();
+/// assert!(bytes > 4096 * 80);
+/// # drop(publisher);
+/// # drop(node);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn shared_memory_files(config: &Config) -> io::Result<Vec<(PathBuf, u64)>> {
     let files = files(Path::new(SHARED_MEMORY), &config.global.prefix.to_string())?;
     Ok(files

@@ -28,6 +28,22 @@ type IpcNode = iceoryx2::node::Node<ipc::Service>;
 ///
 /// Drop it after the ports and services that were made from it: the last one of all processes then
 /// leaves no file in `/dev/shm`.
+///
+/// ```
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport::{self, inspect};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// let node = transport::open_node_with("my-robot", &config)?;
+/// let health = transport::health(&node, &Instance::default())?;
+/// // Ports and services first, then the node: nothing is left.
+/// drop(health);
+/// drop(node);
+/// assert!(inspect::shared_memory_files(&config)?.is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Node {
     node: IpcNode,
@@ -90,6 +106,17 @@ impl Drop for NodeCounter {
 }
 
 /// Removes iceoryx2's count of nodes if there is no node, for a process that cleans up and has none of its own.
+///
+/// ```
+/// use inekf_shared::transport::{self, inspect};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// transport::remove_node_counter(&config);
+/// assert!(inspect::shared_memory_files(&config)?.is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn remove_node_counter(config: &Config) {
     drop(NodeCounter(config.clone()));
 }
@@ -109,6 +136,16 @@ pub const IPC_ROOT_AND_PREFIX_MAX_LEN: usize = 107 - 1 - 39 - 6;
 /// # Errors
 /// [`TransportError::Setting`] if `root` is not an absolute path, `prefix` no start of a file name, or both together too
 /// long.
+///
+/// ```
+/// use inekf_shared::transport::config;
+///
+/// let apart = config(Some("/tmp/mine"), Some("mine_"))?;
+/// assert_eq!(apart.global.prefix.to_string(), "mine_");
+/// assert!(config(Some("not/absolute"), None).is_err());
+/// assert!(config(None, Some("a/b")).is_err());
+/// # Ok::<(), inekf_shared::transport::TransportError>(())
+/// ```
 pub fn config(root: Option<&str>, prefix: Option<&str>) -> Result<Config, TransportError> {
     let refuse = |variable, value: Option<&str>, fault| TransportError::Setting {
         variable,
@@ -148,6 +185,16 @@ pub fn config(root: Option<&str>, prefix: Option<&str>) -> Result<Config, Transp
 ///
 /// # Errors
 /// [`TransportError::Setting`] if a variable is set to what cannot be used.
+///
+/// ```
+/// use inekf_shared::transport::{config_from_env, open_node_with};
+///
+/// // The same as `open_node("my-robot")`; in between the configuration can be looked at.
+/// let config = config_from_env()?;
+/// let root = config.global.root_path().to_string();
+/// assert!(root.starts_with('/'));
+/// # Ok::<(), inekf_shared::transport::TransportError>(())
+/// ```
 pub fn config_from_env() -> Result<Config, TransportError> {
     let read = |variable| match env::var(variable) {
         Ok(value) => Ok(Some(value)),
@@ -168,6 +215,17 @@ pub fn config_from_env() -> Result<Config, TransportError> {
 ///
 /// # Errors
 /// As [`config_from_env`] and [`open_node_with`].
+///
+/// It is not run here, for it opens the shared memory that the environment names, and is others' too:
+///
+/// ```no_run
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// let node = transport::open_node("my-robot")?;
+/// let health = transport::health(&node, &Instance::new("car")?)?.subscriber()?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn open_node(name: &str) -> Result<Node, TransportError> {
     open_node_with(name, &config_from_env()?)
 }
@@ -177,6 +235,17 @@ pub fn open_node(name: &str) -> Result<Node, TransportError> {
 ///
 /// # Errors
 /// As [`open_node`].
+///
+/// It is not run here, for it opens the shared memory that the environment names, and is others' too:
+///
+/// ```no_run
+/// use inekf_shared::transport;
+///
+/// transport::sweep(&transport::config_from_env()?)?;
+/// let nodes: Result<Vec<_>, _> = (0..100).map(|_| transport::open_another_node("fleet")).collect();
+/// assert_eq!(nodes?.len(), 100);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn open_another_node(name: &str) -> Result<Node, TransportError> {
     require_descriptors()?;
     let mut config = config_from_env()?;
@@ -193,6 +262,17 @@ pub fn open_another_node(name: &str) -> Result<Node, TransportError> {
 /// # Errors
 /// [`TransportError::Node`]; [`TransportError::Space`] or [`TransportError::Descriptors`] if there is too little of
 /// either for anything to be opened.
+///
+/// ```
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// let config = transport::config(root.path().to_str(), prefix)?;
+/// let node = transport::open_node_with("my-robot", &config)?;
+/// assert_eq!(node.name().as_str(), "my-robot");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn open_node_with(name: &str, config: &Config) -> Result<Node, TransportError> {
     require_descriptors()?;
     require_shared_memory(LEAST_FREE)?;

@@ -24,6 +24,20 @@ use crate::qos::{self, PubSubQos};
 use crate::topic::{Instance, Topic};
 
 /// A message that clients send to the daemon.
+///
+/// ```
+/// use inekf_shared::message::{HeadingFix, Zero};
+/// use inekf_shared::topic::Topic;
+/// use inekf_shared::transport::InputMessage;
+///
+/// /// Whatever the sensor.
+/// fn stamp_ns<M: InputMessage>(message: &M) -> u64 {
+///     message.header().stamp_ns
+/// }
+///
+/// assert_eq!(stamp_ns(&HeadingFix::ZERO), 0);
+/// assert_eq!(HeadingFix::TOPIC, Topic::Heading);
+/// ```
 pub trait InputMessage: Message {
     /// The topic it is sent on.
     const TOPIC: Topic;
@@ -61,6 +75,21 @@ input_message! {
 }
 
 /// All inputs of an instance.
+///
+/// ```
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let inputs = transport::inputs(&node, &Instance::new("car")?)?;
+/// let daemon = inputs.velocity.subscriber()?;
+/// // Each input has ports of its own.
+/// assert_eq!((inputs.velocity.subscriber_count(), inputs.imu.subscriber_count()), (1, 0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Inputs {
     /// Inertial samples.
@@ -81,6 +110,22 @@ pub struct Inputs {
 ///
 /// # Errors
 /// As [`input`], for the first that fails.
+///
+/// ```
+/// use inekf_shared::message::{HeadingFix, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let inputs = transport::inputs(&node, &Instance::new("car")?)?;
+/// let (sender, receiver) = (inputs.heading.publisher()?, inputs.heading.subscriber()?);
+/// assert_eq!(sender.send_copy(HeadingFix { heading_rad: 0.5, ..HeadingFix::ZERO })?, 1);
+/// assert_eq!(receiver.receive()?.expect("sent").heading_rad, 0.5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn inputs(node: &Node, instance: &Instance) -> Result<Inputs, TransportError> {
     Ok(Inputs {
         imu: input(node, instance)?,
@@ -96,6 +141,21 @@ pub fn inputs(node: &Node, instance: &Instance) -> Result<Inputs, TransportError
 ///
 /// # Errors
 /// [`TransportError`], naming the service.
+///
+/// ```
+/// use inekf_shared::message::{ImuSample, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let imu = transport::input::<ImuSample>(&node, &Instance::new("car")?)?;
+/// // Nobody listens yet: it goes to nobody, and that is no error.
+/// assert_eq!(imu.publisher()?.send_copy(ImuSample::ZERO)?, 0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn input<M: InputMessage>(
     node: &Node,
     instance: &Instance,
@@ -107,6 +167,23 @@ pub fn input<M: InputMessage>(
 ///
 /// # Errors
 /// [`TransportError::Incompatible`] if the instance uses another model, else as [`input`].
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe2, EstimateSe23};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport::{self, TransportError};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let instance = Instance::new("cart")?;
+/// let planar = transport::estimate::<EstimateSe2>(&node, &instance)?;
+/// // Of one model, and both sides are told which.
+/// let other = transport::estimate::<EstimateSe23>(&node, &instance);
+/// assert!(matches!(other, Err(TransportError::Incompatible { .. })));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn estimate<E: EstimateMessage>(
     node: &Node,
     instance: &Instance,
@@ -118,6 +195,23 @@ pub fn estimate<E: EstimateMessage>(
 ///
 /// # Errors
 /// As [`input`].
+///
+/// ```
+/// use inekf_shared::message::{SmoothedState, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let states = transport::smoothed(&node, &Instance::new("car")?)?;
+/// let reader = states.subscriber()?;
+/// states.publisher()?.send_copy(SmoothedState { index: 3, ..SmoothedState::ZERO })?;
+/// // Sent by one that has gone before its counterpart had connected: it is lost.
+/// assert!(reader.receive()?.is_none());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn smoothed(node: &Node, instance: &Instance) -> Result<PubSub<SmoothedState>, TransportError> {
     pub_sub(node, instance, Topic::Smoothed)
 }
@@ -126,6 +220,25 @@ pub fn smoothed(node: &Node, instance: &Instance) -> Result<PubSub<SmoothedState
 ///
 /// # Errors
 /// As [`input`].
+///
+/// ```
+/// use inekf_shared::message::{Health, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let health = transport::health(&node, &Instance::new("car")?)?;
+/// let daemon = health.publisher()?;
+/// daemon.send_copy(Health { uptime_ns: 7, ..Health::ZERO })?;
+/// // Who comes later gets the last one too, as soon as the daemon sends again.
+/// let late = health.subscriber()?;
+/// daemon.send_copy(Health { uptime_ns: 8, ..Health::ZERO })?;
+/// assert_eq!(late.receive()?.map(|health| health.uptime_ns), Some(7));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn health(node: &Node, instance: &Instance) -> Result<PubSub<Health>, TransportError> {
     pub_sub(node, instance, Topic::Health)
 }
@@ -134,6 +247,24 @@ pub fn health(node: &Node, instance: &Instance) -> Result<PubSub<Health>, Transp
 ///
 /// # Errors
 /// As [`input`].
+///
+/// ```
+/// use inekf_shared::message::{JOURNAL_SETTLE, JournalEntry};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let journal = transport::journal(&node, &Instance::new("car")?)?;
+/// let (recorder, daemon) = (journal.subscriber()?, journal.publisher()?);
+/// for index in 0..3 {
+///     daemon.send_copy(JournalEntry::new(index, 0, JOURNAL_SETTLE, &[]))?;
+/// }
+/// assert_eq!(recorder.receive()?.map(|entry| entry.index), Some(0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn journal(node: &Node, instance: &Instance) -> Result<PubSub<JournalEntry>, TransportError> {
     pub_sub(node, instance, Topic::Journal)
 }
@@ -143,6 +274,23 @@ pub fn journal(node: &Node, instance: &Instance) -> Result<PubSub<JournalEntry>,
 ///
 /// # Errors
 /// [`TransportError::Internal`] if the service's description cannot be read.
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe2, MODEL_ODOMETRY_2D};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let instance = Instance::new("cart")?;
+/// assert_eq!(transport::estimate_model(&node, &instance)?, None);
+/// let estimates = transport::estimate::<EstimateSe2>(&node, &instance)?;
+/// assert_eq!(transport::estimate_model(&node, &instance)?, Some(MODEL_ODOMETRY_2D));
+/// # drop(estimates);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn estimate_model(node: &Node, instance: &Instance) -> Result<Option<u32>, TransportError> {
     let service = Topic::Estimate.service_name(instance);
     let name = service_name(&service)?;
@@ -221,6 +369,27 @@ fn pub_sub<M: Message>(
 ///
 /// # Errors
 /// As [`input`].
+///
+/// ```
+/// use inekf_shared::message::{CONTROL_SNAPSHOT, ControlRequest, ControlResponse};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport::{self, TransportError};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let control = transport::control(&node, &Instance::new("car")?)?;
+/// let (server, client) = (control.server()?, control.client()?);
+/// let pending = client.send_copy(ControlRequest { kind: CONTROL_SNAPSHOT, request_id: 5, ..Default::default() })?;
+/// // What a daemon does:
+/// let request = server.receive()?.expect("asked");
+/// request.send_copy(ControlResponse { request_id: request.request_id, ..Default::default() })?;
+/// assert_eq!(pending.receive()?.expect("answered").request_id, 5);
+/// // A second daemon of the instance is found out, and told whose place it wants.
+/// assert!(matches!(control.server(), Err(TransportError::Full { holders, .. }) if holders == [std::process::id()]));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn control(node: &Node, instance: &Instance) -> Result<Control, TransportError> {
     let service = Topic::Control.service_name(instance);
     let name = service_name(&service)?;
@@ -264,6 +433,27 @@ pub fn control(node: &Node, instance: &Instance) -> Result<Control, TransportErr
 ///
 /// # Errors
 /// As [`input`].
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let wake = transport::wake(&node, &Instance::new("car")?)?;
+/// let (daemon, feeder) = (wake.listener()?, wake.notifier()?);
+/// assert!(!daemon.wait(Duration::ZERO)?);
+/// feeder.notify()?;
+/// feeder.notify()?;
+/// // One wake-up may stand for many messages.
+/// assert!(daemon.wait(Duration::from_secs(5))?);
+/// assert!(!daemon.wait(Duration::ZERO)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn wake(node: &Node, instance: &Instance) -> Result<Wake, TransportError> {
     let service = Topic::Wake.service_name(instance);
     let name = service_name(&service)?;
@@ -292,6 +482,25 @@ pub fn wake(node: &Node, instance: &Instance) -> Result<Wake, TransportError> {
 ///
 /// # Errors
 /// As [`input`].
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe2, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let instance = Instance::new("cart")?;
+/// let latest = transport::latest(&node, &instance, EstimateSe2::ZERO)?;
+/// let (writer, reader) = (latest.writer()?, latest.reader()?);
+/// assert!(writer.write(EstimateSe2 { theta_rad: 0.1, ..EstimateSe2::ZERO }));
+/// assert!(writer.write(EstimateSe2 { theta_rad: 0.2, ..EstimateSe2::ZERO }));
+/// // The newest, whole; and again, as often as it is asked for.
+/// assert_eq!((reader.read().theta_rad, reader.read().theta_rad), (0.2, 0.2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn latest<E: EstimateMessage>(
     node: &Node,
     instance: &Instance,
@@ -337,6 +546,26 @@ fn open_blackboard(
 ///
 /// # Errors
 /// [`TransportError::Missing`] if no daemon of the instance has started yet, else as [`input`].
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe2, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let instance = Instance::new("cart")?;
+/// // The daemon makes it, nobody else.
+/// let early = transport::open_latest::<EstimateSe2>(&node, &instance);
+/// assert!(matches!(early, Err(transport::TransportError::Missing { .. })));
+/// let daemon = transport::latest(&node, &instance, EstimateSe2::ZERO)?;
+/// let reader = transport::open_latest::<EstimateSe2>(&node, &instance)?.reader()?;
+/// assert_eq!(reader.read(), EstimateSe2::ZERO);
+/// # drop(daemon);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn open_latest<E: EstimateMessage>(
     node: &Node,
     instance: &Instance,

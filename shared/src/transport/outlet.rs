@@ -16,6 +16,28 @@ use crate::qos;
 type Slot<M> = SampleMutUninit<ipc::Service, MaybeUninit<M>, ()>;
 
 /// Sends the messages of one topic from slots loaned ahead.
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe2, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport::{self, Outlet};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let estimates = transport::estimate::<EstimateSe2>(&node, &Instance::new("cart")?)?;
+/// let reader = estimates.subscriber()?;
+/// let mut outlet = Outlet::new(estimates.publisher()?, 1);
+/// for theta_rad in [0.1, 0.2] {
+///     // From a slot that was loaned before the message was there ..
+///     assert_eq!(outlet.send(&EstimateSe2 { theta_rad, ..EstimateSe2::ZERO })?, 1);
+///     // .. and the next one, now that nothing waits.
+///     outlet.restock();
+/// }
+/// assert_eq!(reader.receive()?.expect("sent").theta_rad, 0.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Outlet<M: Message> {
     publisher: Publisher<M>,
     depth: usize,
@@ -40,6 +62,22 @@ impl<M: Message> Outlet<M> {
     ///
     /// # Errors
     /// iceoryx2's: a full `/dev/shm`, or a connection that is broken.
+    ///
+    /// ```
+    /// use inekf_shared::message::{ImuSample, Zero};
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport::{self, Outlet};
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = transport::open_node_with("doc", &config)?;
+    /// let imu = transport::input::<ImuSample>(&node, &Instance::new("car")?)?;
+    /// // Without a slot ahead it loans one when it sends.
+    /// let mut outlet = Outlet::new(imu.publisher()?, 0);
+    /// assert_eq!(outlet.send(&ImuSample::ZERO)?, 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn send(&mut self, message: &M) -> Result<usize, SendError> {
         let slot = match self.ahead.pop() {
             Some(slot) => slot,

@@ -21,6 +21,22 @@ use super::{Config, TransportError};
 ///
 /// # Errors
 /// [`TransportError::Space`] if there is too little, [`TransportError::Reserve`] if the files cannot be worked with.
+///
+/// ```
+/// use inekf_shared::message::EstimateSe23;
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let publisher = transport::estimate::<EstimateSe23>(&node, &Instance::new("car")?)?.publisher()?;
+/// // A reader's buffer full of estimates, at least.
+/// assert!(transport::reserve_shared_memory(node.config())? > 1024 * 1288);
+/// # drop(publisher);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn reserve_shared_memory(config: &Config) -> Result<u64, TransportError> {
     let maps = fs::read_to_string("/proc/self/maps").map_err(|error| TransportError::Reserve {
         path: "/proc/self/maps".to_owned(),

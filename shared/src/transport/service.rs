@@ -40,6 +40,28 @@ pub type WakeNotifier = Notifier<ipc::Service>;
 const SLOT_HEADER: usize = 64;
 
 /// An open publish-subscribe topic.
+///
+/// ```
+/// use inekf_shared::message::{HeadingFix, Zero};
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let topic = transport::input::<HeadingFix>(&node, &Instance::new("car")?)?;
+/// let (sender, receiver) = (topic.publisher()?, topic.subscriber()?);
+/// assert_eq!((topic.publisher_count(), topic.subscriber_count()), (1, 1));
+/// // Of a topic that overflows the oldest are dropped; nobody waits.
+/// for number in 0..1030 {
+///     let mut fix = HeadingFix::ZERO;
+///     fix.header.seq = number;
+///     sender.send_copy(fix)?;
+/// }
+/// assert_eq!(receiver.receive()?.map(|fix| fix.header.seq), Some(6));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct PubSub<M: Message> {
     service: String,
@@ -108,6 +130,22 @@ impl<M: Message> PubSub<M> {
     ///
     /// # Errors
     /// As [`PubSub::publisher`].
+    ///
+    /// ```
+    /// use inekf_shared::message::ImuSample;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport::{self, TransportError};
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = transport::open_node_with("doc", &config)?;
+    /// let imu = transport::input::<ImuSample>(&node, &Instance::new("car")?)?;
+    /// let held: Result<Vec<_>, _> = (0..4).map(|_| imu.subscriber()).collect();
+    /// assert!(matches!(imu.subscriber(), Err(TransportError::Full { limit: 4, .. })));
+    /// # drop(held?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn subscriber(&self) -> Result<Subscriber<M>, TransportError> {
         let create = || {
             self.factory
@@ -145,6 +183,23 @@ impl<M: Message> PubSub<M> {
 }
 
 /// The open control topic.
+///
+/// ```
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let control = transport::control(&node, &Instance::new("car")?)?;
+/// assert!(control.server_pids().is_empty());
+/// let server = control.server()?;
+/// // Whose daemon it is.
+/// assert_eq!(control.server_pids(), [std::process::id()]);
+/// # drop(server);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Control {
     service: String,
@@ -440,6 +495,22 @@ impl Wake {
 }
 
 /// Waits to be woken.
+///
+/// ```
+/// use std::time::Duration;
+///
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let listener = transport::wake(&node, &Instance::new("car")?)?.listener()?;
+/// // Nobody has notified: it ends by its time-out, and says so.
+/// assert!(!listener.wait(Duration::from_millis(1))?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct WakeListener {
     service: String,

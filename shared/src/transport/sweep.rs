@@ -35,6 +35,14 @@ const HASH_LEN: usize = 40;
 const BEING_WRITTEN: u32 = 0o600;
 
 /// What a sweep did.
+///
+/// ```
+/// use inekf_shared::transport::Swept;
+///
+/// // A daemon was killed: one node, its services, and files besides.
+/// let swept = Swept { nodes: 1, services: 13, files: 2, ..Swept::default() };
+/// assert_eq!(swept.kept, 0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Swept {
     /// Nodes of dead processes that were removed.
@@ -52,6 +60,21 @@ pub struct Swept {
 ///
 /// # Errors
 /// [`TransportError::Internal`] if nodes or folders cannot be listed.
+///
+/// ```
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport::{self, Swept, sweep};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let health = transport::health(&node, &Instance::new("car")?)?;
+/// // What a living process uses is never touched.
+/// assert_eq!(sweep(&config)?, Swept::default());
+/// assert!(health.publisher().is_ok());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn sweep(config: &Config) -> Result<Swept, TransportError> {
     // Cleaning up after a node opens what it had open, and may meet what was never finished.
     let _warden = Warden::of(config);
@@ -79,6 +102,17 @@ pub fn sweep(config: &Config) -> Result<Swept, TransportError> {
 
 /// The process that made what bears this id, as iceoryx2 0.10 writes ids: seconds, nanoseconds, process, count, of 32
 /// bits each, as one number of 128 bits.
+///
+/// ```
+/// use inekf_shared::transport::{self, process_of};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// assert_eq!(process_of(node.id().value()), std::process::id());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[must_use]
 pub const fn process_of(id: u128) -> u32 {
     (id >> 64) as u32

@@ -14,6 +14,24 @@ use super::{Node, TransportError};
 use crate::clock::monotonic_ns;
 
 /// The files without which nobody can attach: the node's own, the services' that it has open, and its ports' data.
+///
+/// ```
+/// use inekf_shared::topic::Instance;
+/// use inekf_shared::transport::{self, Watched};
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+/// # let config = transport::config(root.path().to_str(), prefix)?;
+/// # let node = transport::open_node_with("doc", &config)?;
+/// let health = transport::health(&node, &Instance::new("car")?)?.publisher()?;
+/// let watched = Watched::of(&node)?;
+/// assert!(watched.is_intact());
+/// // Somebody tidies up.
+/// std::fs::remove_dir_all(root.path().join("services"))?;
+/// assert!(!watched.is_intact());
+/// # drop(health);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Watched(Vec<Seen>);
 
@@ -79,6 +97,20 @@ impl Watched {
     ///
     /// # Errors
     /// As [`Watched::of`].
+    ///
+    /// ```
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport::{self, Watched};
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = transport::open_node_with("doc", &config)?;
+    /// let health = transport::health(&node, &Instance::new("car")?)?;
+    /// assert!(Watched::services_of(&node)?.is_intact());
+    /// # drop(health);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn services_of(node: &Node) -> Result<Self, TransportError> {
         Self::listed(node, false)
     }
@@ -147,6 +179,23 @@ impl Watched {
 
     /// Runs `let_go`, which ends the use of these files, and puts back what others have made of the same name since: the
     /// last user of a service removes its description by name.
+    ///
+    /// ```
+    /// use inekf_shared::transport::{self, Watched};
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = transport::open_node_with("doc", &config)?;
+    /// // What ends the use of the files, and what it returns.
+    /// let watched = Watched::of(&node)?;
+    /// let left = watched.sparing_others(|| {
+    ///     drop(node);
+    ///     true
+    /// });
+    /// assert!(left && !watched.is_intact());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn sparing_others<T>(&self, let_go: impl FnOnce() -> T) -> T {
         let others = self.0.iter().filter(|file| file.is_replaced());
         let aside: Vec<(&Path, PathBuf)> = others

@@ -22,7 +22,7 @@ use inekf_tests::programs::{bench, c_library, example, programs};
 use inekf_tests::tools;
 
 /// A block of commands that is not run: its page, how its first line begins, and why not.
-const NOT_RUN: [(&str, &str, &str); 8] = [
+const NOT_RUN: [(&str, &str, &str); 9] = [
     (
         "README.md",
         "cargo test --workspace",
@@ -32,6 +32,11 @@ const NOT_RUN: [(&str, &str, &str); 8] = [
         "docs/guides/run-it-for-real.md",
         "sudo install",
         "wants root and systemd; supervisor.rs plays systemd's part",
+    ),
+    (
+        "docs/guides/write-a-feeder.md",
+        "cmake -S client/examples/cpp",
+        "wants iceoryx2's C++ bindings; languages.rs runs it where they are",
     ),
     (
         "docs/faults.md",

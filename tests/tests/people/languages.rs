@@ -274,8 +274,11 @@ fn the_cpp_reader_reads_a_running_daemon() {
     tools::finish(Running::start(compile)).succeeded();
 
     let memory = Memory::new();
-    let daemon = Daemon::start(&memory, "car", PLACED);
     let program = build.join("reader").into_os_string();
+    let nobody = run(&memory, &program, &["nobody", "1"], &build).wait();
+    let line = nobody.failed_with_one_line(1);
+    assert!(line.contains("no daemon of instance nobody runs"), "{line}");
+    let daemon = Daemon::start(&memory, "car", PLACED);
     let reader = run(&memory, &program, &["car", "5"], &build);
     assert_reads(&feed_until_ended(&memory, reader));
     daemon.stop();

@@ -6,7 +6,8 @@
 //!
 //! The tunnel is no part of the project, for zenoh is large: `INEKF_TUNNEL` names the program
 //! `iox2-link-tunnel-zenoh`, or it is on the path (`cargo install iceoryx2-integrations-zenoh-link-tunnel-cli --version
-//! 0.10.0`). Without it, or where nobody may make namespaces, the test says that it skips.
+//! 0.10.0`). Without it, or where nobody may make namespaces, the tests say that they skip; the one over a slow cable also
+//! where the kernel cannot emulate one (`tc` with netem).
 
 use std::env;
 use std::ffi::OsString;
@@ -43,7 +44,7 @@ lever_arm_m = [-0.3, 0.0, 0.5]
 ";
 
 /// Two hosts at the ends of a cable, in a network and a user namespace of their own; a tunnel on
-/// each, until it is told to stop.
+/// each, until it is told to stop. What leaves the first host suffers `$NETEM`, if that is not empty.
 const TWO_HOSTS: &str = r#"
 mount -t tmpfs none /run
 for host in one two; do ip netns add $host; done
@@ -53,6 +54,7 @@ ip -n two address add 10.77.0.2/24 dev eth2
 for host in one two; do ip -n $host link set lo up; done
 ip -n one link set eth1 up
 ip -n two link set eth2 up
+[ -z "$NETEM" ] || tc -n one qdisc add dev eth1 root netem $NETEM
 trap 'kill $(jobs -p) 2> /dev/null; wait' EXIT
 trap 'exit 0' TERM
 (cd one; exec ip netns exec one $TUNNEL --zenoh-config zenoh.json5 --allow 'inekf/*/estimate' --reactive --poll 10) > one.log 2>&1 &
@@ -71,17 +73,29 @@ fn tunnel() -> Option<OsString> {
         );
         return None;
     }
-    let namespaces = ["--user", "--map-root-user", "--net", "--mount"];
-    let trial = "mount -t tmpfs none /run && ip netns add one";
-    if !runs(
-        Command::new("unshare")
-            .args(namespaces)
-            .args(["sh", "-c", trial]),
-    ) {
+    if !works("true") {
         println!("skipped: no namespaces can be made here");
         return None;
     }
     Some(program)
+}
+
+/// Whether a host of one's own can be made in a namespace, and what is done to it there.
+fn works(on_it: &str) -> bool {
+    Command::new("unshare")
+        .args([
+            "--user",
+            "--map-root-user",
+            "--net",
+            "--mount",
+            "sh",
+            "-euc",
+        ])
+        .arg(format!(
+            "mount -t tmpfs none /run; ip netns add one; {on_it}"
+        ))
+        .output()
+        .is_ok_and(|output| output.status.success())
 }
 
 /// What the tunnel has to know of a host: where its shared memory is, and how it is reached.
@@ -116,6 +130,25 @@ fn configure(folder: &Path, memory: &Memory, zenoh: &str) {
 #[test]
 fn an_estimate_is_read_on_another_host() {
     let Some(tunnel) = tunnel() else { return };
+    read_on_another_host(&tunnel, "");
+}
+
+/// Zenoh's link is TCP: what a bad cable loses comes again, later, and in its place.
+#[test]
+fn over_a_slow_cable_that_loses_packets_estimates_come_in_order_and_later() {
+    let Some(tunnel) = tunnel() else { return };
+    if !works("tc -n one qdisc add dev lo root netem delay 1ms") {
+        println!("skipped: `tc` with netem is not to be had here (a module of the kernel)");
+        return;
+    }
+    let delays_us = read_on_another_host(&tunnel, "delay 20ms loss 1%");
+    // None is faster than the cable, whatever the machine does besides.
+    assert!(delays_us[0] >= 20e3, "{} us", delays_us[0]);
+}
+
+/// Reads some hundred estimates of one host on the other, over a cable with this disturbance, and returns how long each
+/// took from its publication to its reader, us, the shortest first. They come in order and make sense.
+fn read_on_another_host(tunnel: &OsString, netem: &str) -> Vec<f64> {
     let (one, two) = (Memory::new(), Memory::new());
     let folder = Folder::new();
     configure(
@@ -141,7 +174,8 @@ fn an_estimate_is_read_on_another_host() {
     cable
         .args(["--user", "--map-root-user", "--net", "--mount"])
         .args(["bash", "-euc", TWO_HOSTS])
-        .env("TUNNEL", &tunnel)
+        .env("TUNNEL", tunnel)
+        .env("NETEM", netem)
         .current_dir(folder.path());
     let cable = Running::start(cable);
     let mut feeder = one.command(&programs().client);
@@ -206,4 +240,5 @@ fn an_estimate_is_read_on_another_host() {
     drop(feeder);
     daemon.signal(Signal::TERM);
     tools::finish(daemon).succeeded();
+    delays_us
 }

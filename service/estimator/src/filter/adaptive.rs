@@ -35,6 +35,23 @@ use mixture::{Chart, Local, merged, moments};
 pub use modes::{Expected, Mode, STANDARD_MODES, Switching, standard_modes};
 
 /// A bank of S augmented filters on `G x R^P`, `D = B + P`, with B the dimension of G.
+///
+/// ```
+/// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::Vector3;
+///
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+/// let (modes, switching) = standard_modes(&[wheel], 0.1);
+/// let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::ITERATED);
+/// // Nothing has been seen: the pose is the prior's, the weights are those of the start.
+/// assert_eq!(bank.weights(), &switching.initial);
+/// let estimate = bank.estimate();
+/// assert!((estimate.covariance.matrix()[(1, 1)] - 1.0).abs() < 1e-9);
+/// assert_eq!(estimate.mean.parameters[0], 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive<G, const B: usize, const P: usize, const D: usize, const S: usize> {
     modes: [Mode<P>; S],

@@ -15,6 +15,17 @@ use crate::lie::{LieGroup, SE23};
 use crate::model::{ImuIncrement, Transition};
 
 /// `chi = (Exp(phi) R_hat, x_hat + rho)`.
+///
+/// ```
+/// use inekf::filter::{Additive, Side};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::Vector3;
+///
+/// // Components are subtracted: 0.1 rad, and the position in world axes.
+/// let hat = SE2::identity();
+/// let chi = Additive::retract(&hat, &Vector3::new(0.1, 2.0, -1.0));
+/// assert!((Additive::difference(&hat, &chi) - Vector3::new(0.1, 2.0, -1.0)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Additive;
 

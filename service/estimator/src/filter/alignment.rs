@@ -13,6 +13,17 @@ use crate::lie::{LieGroup, SE23, SO3, hat};
 use crate::model::InertialState;
 
 /// An attitude found by levelling.
+///
+/// ```
+/// use inekf::filter::Levelled;
+/// use nalgebra::Vector3;
+///
+/// // At rest, rolled: what is felt is up, wherever that is in the body.
+/// let up_b = Vector3::new(0.0, 3.0, 9.3);
+/// let level = Levelled::from_force(&up_b, 0.5).expect("enough force");
+/// assert!((level.r_wb.rotate(&up_b).normalize() - Vector3::z()).norm() < 1e-12);
+/// assert!((level.r_wb.heading_rad() - 0.5).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Levelled {
     /// Body to world.
@@ -22,6 +33,14 @@ pub struct Levelled {
 impl Levelled {
     /// Roll and pitch from the mean specific force `force_b` (m/s^2, body frame), heading as given
     /// (rad, counter-clockwise from east). `None` if the force is too small to show where up is.
+    ///
+    /// ```
+    /// use inekf::filter::Levelled;
+    /// use nalgebra::Vector3;
+    ///
+    /// // In free fall nothing says where up is.
+    /// assert!(Levelled::from_force(&Vector3::zeros(), 0.0).is_none());
+    /// ```
     pub fn from_force(force_b: &Vector3<f64>, heading: f64) -> Option<Self> {
         let norm = force_b.norm();
         if !(norm.is_finite() && norm > 1.0) {
@@ -37,6 +56,20 @@ impl Levelled {
 }
 
 /// Means and standard deviations of the biases.
+///
+/// ```
+/// use inekf::filter::BiasPrior;
+/// use nalgebra::Vector3;
+///
+/// // A MEMS sensor out of the box: 0.1 deg/s and 50 mg, on each axis.
+/// let prior = BiasPrior {
+///     gyro_bias: Vector3::zeros(),
+///     gyro_sigma: 0.1_f64.to_radians(),
+///     accel_bias: Vector3::zeros(),
+///     accel_sigma: 0.05 * 9.80665,
+/// };
+/// assert!((prior.accel_sigma - 0.49).abs() < 1e-3);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BiasPrior {
     /// Gyroscope bias, rad/s, body frame.
@@ -50,6 +83,33 @@ pub struct BiasPrior {
 }
 
 /// Everything the first belief is made of.
+///
+/// ```
+/// use inekf::filter::{Alignment, Belief, BiasPrior, Left};
+/// use inekf::lie::{LieGroup, SE23, SO3};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// let alignment = Alignment {
+///     r_wb: SO3::identity(),
+///     tilt_sigma: 0.01,
+///     heading_sigma: 1.0,
+///     velocity_w: Vector3::zeros(),
+///     velocity_sigma: 0.1,
+///     position_w: Vector3::new(0.0, 0.0, 2.0),
+///     position_covariance_w: Matrix3::identity(),
+///     lever_arm_b: Vector3::new(0.0, 0.0, 2.0), // to an antenna 2 m above the IMU
+///     biases: BiasPrior {
+///         gyro_bias: Vector3::zeros(),
+///         gyro_sigma: 0.0,
+///         accel_bias: Vector3::zeros(),
+///         accel_sigma: 0.0,
+///     },
+/// };
+/// let belief: Belief<SE23, Left, 9> = alignment.belief();
+/// // The antenna is where it was seen, so the IMU is below it, and leans with what is not known of the tilt.
+/// assert!(belief.mean.position.norm() < 1e-12);
+/// assert!(belief.covariance.matrix()[(6, 1)].abs() > 1e-5);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alignment {
     /// Attitude, body to world.

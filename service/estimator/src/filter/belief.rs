@@ -40,6 +40,19 @@ impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
     }
 
     /// The belief whose left-invariant error has this covariance.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Right};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let chi = SE2::exp(&Vector3::new(0.5, 3.0, 1.0));
+    /// let left = Covariance::from_variances(&Vector3::new(0.01, 1.0, 4.0));
+    /// // Whatever the side inside, the covariance that is published is of the left-invariant error.
+    /// let belief = Belief::<SE2, Right, 3>::from_left_covariance(chi, left);
+    /// assert!((belief.left_covariance().matrix() - left.matrix()).norm() < 1e-12);
+    /// assert!((belief.covariance.matrix() - left.matrix()).norm() > 0.1);
+    /// ```
     pub fn from_left_covariance(mean: G, mut covariance: Covariance<D>) -> Self {
         if !S::IS_LEFT {
             covariance.transform_by::<G>(&S::from_left(&mean));
@@ -48,6 +61,16 @@ impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
     }
 
     /// Covariance of the left-invariant error, which is what is published.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 4.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// assert_eq!(belief.left_covariance(), p);
+    /// ```
     pub fn left_covariance(&self) -> Covariance<D> {
         let mut covariance = self.covariance;
         if !S::IS_LEFT {
@@ -57,6 +80,19 @@ impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
     }
 
     /// Hands the covariance of the left-invariant error to `read`, as it lies here if it is that one already.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 4.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// // Without a copy: for what is written into a message with every sample.
+    /// let mut message = [0.0; 6];
+    /// belief.with_left_covariance(|p| p.write_upper_triangle(&mut message));
+    /// assert_eq!(message, [0.01, 0.0, 0.0, 1.0, 0.0, 4.0]);
+    /// ```
     #[inline]
     pub fn with_left_covariance<T>(&self, read: impl FnOnce(&Covariance<D>) -> T) -> T {
         if S::IS_LEFT {
@@ -67,6 +103,17 @@ impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
     }
 
     /// Whether mean and covariance are finite and no variance is negative.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 4.0));
+    /// let nowhere = SE2::exp(&Vector3::new(0.0, f64::INFINITY, 0.0));
+    /// assert!(Belief::<SE2, Left, 3>::new(SE2::identity(), p).is_plausible());
+    /// assert!(!Belief::<SE2, Left, 3>::new(nowhere, p).is_plausible());
+    /// ```
     pub fn is_plausible(&self) -> bool {
         self.mean.is_finite() && self.covariance.is_plausible()
     }
@@ -74,6 +121,19 @@ impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
 
 impl<G: LieGroup<D>, const D: usize> Belief<G, Left, D> {
     /// The same belief in the right-invariant error (\[PAR\] (14) with `A = Ad_chi`).
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// // A metre along the body's x axis of a vehicle that faces north is a metre along y.
+    /// let mut north = SE2::exp(&Vector3::new(90_f64.to_radians(), 0.0, 0.0));
+    /// north.position = Vector2::zeros();
+    /// let p = Covariance::from_variances(&Vector3::new(0.0, 1.0, 0.0));
+    /// let right = Belief::<SE2, Left, 3>::new(north, p).to_right();
+    /// assert!((right.covariance.matrix()[(2, 2)] - 1.0).abs() < 1e-12);
+    /// ```
     pub fn to_right(&self) -> Belief<G, Right, D> {
         Belief::from_left_covariance(self.mean, self.covariance)
     }
@@ -81,6 +141,16 @@ impl<G: LieGroup<D>, const D: usize> Belief<G, Left, D> {
 
 impl<G: LieGroup<D>, const D: usize> Belief<G, Right, D> {
     /// The same belief in the left-invariant error.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Right};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 4.0));
+    /// let right = Belief::<SE2, Right, 3>::new(SE2::exp(&Vector3::new(0.5, 3.0, 1.0)), p);
+    /// assert!((right.to_left().to_right().covariance.matrix() - p.matrix()).norm() < 1e-12);
+    /// ```
     pub fn to_left(&self) -> Belief<G, Left, D> {
         Belief::new(self.mean, self.left_covariance())
     }

@@ -16,10 +16,31 @@ use super::side::Side;
 use crate::lie::LieGroup;
 
 /// `chi = (R_hat Exp(phi), x_hat + R_hat rho)`, every vector in body axes.
+///
+/// ```
+/// use inekf::filter::{Gtsam, Side};
+/// use inekf::lie::{LieGroup, SE3};
+/// use nalgebra::Vector6;
+///
+/// let (chi, xi) = (SE3::exp(&Vector6::repeat(0.2)), Vector6::new(0.3, -0.1, 0.2, 1.0, 2.0, 3.0));
+/// // Uncoupled, in body axes: the translation is not bent by the rotation.
+/// let moved = Gtsam::retract(&chi, &xi);
+/// let step = chi.rotation.inverse_rotate(&(moved.position - chi.position));
+/// assert!((step - nalgebra::Vector3::new(1.0, 2.0, 3.0)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gtsam;
 
 /// `chi = (R_hat Exp(phi), v_hat + nu, x_hat + R_hat rho)`: the velocity in world axes, all else in body axes.
+///
+/// ```
+/// use inekf::filter::{Forster, Side};
+/// use inekf::lie::{LieGroup, SE3};
+/// use nalgebra::Vector6;
+///
+/// let (chi, xi) = (SE3::exp(&Vector6::repeat(0.2)), Vector6::new(0.3, -0.1, 0.2, 1.0, 2.0, 3.0));
+/// assert!((Forster::difference(&chi, &Forster::retract(&chi, &xi)) - xi).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Forster;
 

@@ -18,6 +18,34 @@ use crate::model::{
 };
 
 /// The gain that the declared mismatches do not reach.
+///
+/// ```
+/// use inekf::filter::{Belief, Constrained, Covariance, Left, UpdateOptions, update_with};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{
+///     Declared, OdometryStep, OutputMismatch, PlanarPair, PointFix, ProcessColumns, ProcessMismatch,
+/// };
+/// use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+///
+/// let fix = |position_w| PointFix {
+///     position_w,
+///     covariance_w: Matrix2::identity(),
+///     lever_arm_b: Vector2::zeros(),
+///     scale_error: 0.0,
+/// };
+/// let points = PlanarPair::new([fix(Vector2::new(9.5, 0.3)), fix(Vector2::new(20.0, 0.0))]);
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let mut belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// belief.mean.position.x = 10.0;
+/// // The second source shows twice the distance: its scale is declared to be unknown.
+/// let process = ProcessColumns::<3, ProcessMismatch>::new(&[]).expect("none");
+/// let outputs = [Declared::hard(OutputMismatch::MeasurementScale { source: 1 })];
+/// let rule = Constrained::new(&belief, &process, &outputs, &points);
+/// update_with(&mut belief, &points, &rule, &UpdateOptions::ITERATED)?;
+/// // So it says nothing along x, and the first one is followed half way.
+/// assert!((belief.mean.position.x - 9.75).abs() < 0.05);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constrained<'a, const D: usize, const K: usize, const N: usize, const M: usize> {
     process: [(SVector<f64, D>, f64); MAX_PROCESS_MISMATCHES],
@@ -61,6 +89,27 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
     /// # Errors
     /// [`UpdateError::NoSuchSource`], [`UpdateError::UnsolvableConstraints`] or
     /// [`UpdateError::TooManyConstraints`].
+    ///
+    /// ```
+    /// use inekf::filter::Constrained;
+    /// use inekf::lie::SE2;
+    /// use inekf::model::{
+    ///     Declared, OutputMismatch, PlanarFix, PointFix, ProcessColumns, ProcessMismatch,
+    /// };
+    /// use nalgebra::{Matrix2, Vector2};
+    ///
+    /// let points = PlanarFix::new([PointFix {
+    ///     position_w: Vector2::zeros(),
+    ///     covariance_w: Matrix2::identity(),
+    ///     lever_arm_b: Vector2::zeros(),
+    ///     scale_error: 0.0,
+    /// }]);
+    /// let process = ProcessColumns::<3, ProcessMismatch>::new(&[]).expect("none");
+    /// // There is one source, and the mismatch is of a second.
+    /// let outputs = [Declared::hard(OutputMismatch::MeasurementScale { source: 1 })];
+    /// assert!(Constrained::check::<SE2>(&process, &outputs, &points).is_err());
+    /// assert_eq!(Constrained::check::<SE2>(&process, &[], &points), Ok(0));
+    /// ```
     pub fn check<G: Pose<D, N>>(
         process: &ProcessColumns<D, impl MeanMismatch>,
         outputs: &'a [Declared<OutputMismatch>],

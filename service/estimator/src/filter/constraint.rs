@@ -53,6 +53,34 @@ struct Column<const D: usize, const M: usize> {
 }
 
 /// The columns of `L Delta = T`, on the stack.
+///
+/// ```
+/// use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{Columns, PlanarFix, PointFix};
+/// use nalgebra::{Matrix2, SVector, Vector2, Vector3};
+///
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let fix = PlanarFix::new([PointFix {
+///     position_w: Vector2::new(1.0, 1.0),
+///     covariance_w: Matrix2::identity(),
+///     lever_arm_b: Vector2::zeros(),
+///     scale_error: 0.0,
+/// }]);
+/// let noise = fix.noise_covariance();
+/// let linearised =
+///     Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+/// // Nothing is known of what the sensor shows along x: no gain may follow it there.
+/// let mut constraints = Constraints::<3, 2>::default();
+/// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+/// constraints.push(&along_x, &no_motion, f64::INFINITY)?;
+/// let gain = constraints.gain(&linearised)?;
+/// assert!((gain * Vector2::x()).norm() < 1e-12 && (gain * Vector2::y()).norm() > 0.1);
+/// // It takes one of the two dimensions of the innovation.
+/// assert_eq!((constraints.rank()?, constraints.judge(&linearised)?.degrees), (1, 1));
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constraints<const D: usize, const M: usize> {
     columns: [Column<D, M>; MAX_COLUMNS],

@@ -112,6 +112,15 @@ fn half_transformed<const D: usize>(
 
 impl<const D: usize> Covariance<D> {
     /// The matrix with the upper triangle of `matrix`; what lies below is ignored.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::Matrix2;
+    ///
+    /// // What lies below the diagonal is not looked at.
+    /// let p = Covariance::from_upper(Matrix2::new(4.0, 1.0, f64::NAN, 9.0));
+    /// assert_eq!(p.matrix(), &Matrix2::new(4.0, 1.0, 1.0, 9.0));
+    /// ```
     pub fn from_upper(mut matrix: SMatrix<f64, D, D>) -> Self {
         mirror(&mut matrix);
         Self(matrix)
@@ -126,6 +135,14 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// Independent components with these variances.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::{Matrix2, Vector2};
+    ///
+    /// let p = Covariance::from_variances(&Vector2::new(4.0, 9.0));
+    /// assert_eq!(p.matrix(), &Matrix2::new(4.0, 0.0, 0.0, 9.0));
+    /// ```
     pub fn from_variances(variances: &SVector<f64, D>) -> Self {
         Self(SMatrix::from_diagonal(variances))
     }
@@ -136,6 +153,16 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// `A P A^T`.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::{Matrix2, Vector2};
+    ///
+    /// // Twice as long is four times the variance.
+    /// let p = Covariance::from_variances(&Vector2::new(1.0, 1.0));
+    /// let stretched = p.transformed(&Matrix2::from_diagonal(&Vector2::new(2.0, 1.0)));
+    /// assert_eq!(stretched, Covariance::from_variances(&Vector2::new(4.0, 1.0)));
+    /// ```
     pub fn transformed(&self, a: &SMatrix<f64, D, D>) -> Self {
         let mut result = half_transformed(&half_transformed(&self.0, a), a);
         mirror(&mut result);
@@ -150,11 +177,29 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// `P + Q` for a symmetric Q.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::{Matrix2, Vector2};
+    ///
+    /// // Variances of independent noises add.
+    /// let p = Covariance::from_variances(&Vector2::new(9.0, 1.0)).plus(&Matrix2::from_diagonal_element(16.0));
+    /// assert_eq!(p.matrix()[(0, 0)], 25.0);
+    /// ```
     pub fn plus(&self, q: &SMatrix<f64, D, D>) -> Self {
         Self::from_upper(self.0 + q)
     }
 
     /// `P H^T`, D x M.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::{RowVector2, Vector2};
+    ///
+    /// let p = Covariance::from_variances(&Vector2::new(4.0, 9.0));
+    /// let h = RowVector2::new(0.0, 1.0); // it sees the second state
+    /// assert_eq!(p.times_transposed(&h), Vector2::new(0.0, 9.0));
+    /// ```
     pub fn times_transposed<const M: usize>(&self, h: &SMatrix<f64, M, D>) -> SMatrix<f64, D, M> {
         self.times_transposed_of(&Seen::by(h), h)
     }
@@ -202,6 +247,19 @@ impl<const D: usize> Covariance<D> {
     ///
     /// A alone loses every digit where the measurement is 1e8 times as precise as the prior; the
     /// second term takes its rounding back.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::{Matrix1, RowVector2, Vector2};
+    ///
+    /// let p = Covariance::from_variances(&Vector2::new(1.0, 1.0));
+    /// let (h, n) = (RowVector2::new(1.0, 0.0), Matrix1::new(1.0));
+    /// // As good as what was known: half the variance is left, by half the gain.
+    /// let after = p.corrected(&Vector2::new(0.5, 0.0), &h, &n);
+    /// assert_eq!(after, Covariance::from_variances(&Vector2::new(0.5, 1.0)));
+    /// // Joseph's form holds for any gain, a bad one too: none leaves all.
+    /// assert_eq!(p.corrected(&Vector2::zeros(), &h, &n), p);
+    /// ```
     pub fn corrected<const M: usize>(
         &self,
         gain: &SMatrix<f64, D, M>,
@@ -259,6 +317,15 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// Whether every entry is finite and no variance negative.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::Vector2;
+    ///
+    /// assert!(Covariance::from_variances(&Vector2::new(0.0, 1.0)).is_plausible());
+    /// assert!(!Covariance::from_variances(&Vector2::new(-1.0, 1.0)).is_plausible());
+    /// assert!(!Covariance::from_variances(&Vector2::new(f64::NAN, 1.0)).is_plausible());
+    /// ```
     pub fn is_plausible(&self) -> bool {
         // 0 times what is not finite is NaN, and stays NaN in a sum: no branch for each entry.
         let mut sums = [0.0; D];
@@ -269,6 +336,16 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// Writes the upper triangle, row by row, to the front of `entries`, as far as there is room.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::Matrix2;
+    ///
+    /// // Into a message that has room for more.
+    /// let mut entries = [0.0; 5];
+    /// Covariance::from_upper(Matrix2::new(4.0, 1.0, 0.0, 9.0)).write_upper_triangle(&mut entries);
+    /// assert_eq!(entries, [4.0, 1.0, 9.0, 0.0, 0.0]);
+    /// ```
     pub fn write_upper_triangle(&self, entries: &mut [f64]) {
         let mut rest = entries;
         for (row, column) in self.0.data.0.iter().enumerate() {
@@ -282,11 +359,27 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// The upper triangle, row by row.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::Matrix2;
+    ///
+    /// let p = Covariance::from_upper(Matrix2::new(4.0, 1.0, 0.0, 9.0));
+    /// assert_eq!(p.upper_triangle().collect::<Vec<f64>>(), [4.0, 1.0, 9.0]);
+    /// ```
     pub fn upper_triangle(&self) -> impl Iterator<Item = f64> + '_ {
         (0..D).flat_map(move |row| (row..D).map(move |column| self.0[(row, column)]))
     }
 
     /// From an upper triangle, row by row; `None` if `entries` has not exactly D (D + 1) / 2.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    ///
+    /// let p = Covariance::<2>::from_upper_triangle(&[4.0, 1.0, 9.0]).expect("three entries");
+    /// assert_eq!(p.matrix()[(1, 0)], 1.0);
+    /// assert!(Covariance::<2>::from_upper_triangle(&[4.0, 1.0]).is_none());
+    /// ```
     pub fn from_upper_triangle(entries: &[f64]) -> Option<Self> {
         if entries.len() != D * (D + 1) / 2 {
             return None;

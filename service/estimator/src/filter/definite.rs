@@ -16,6 +16,18 @@ impl<const D: usize> Covariance<D> {
     /// The same if it is definite, else with the least addition to its variances that this factorisation finds. What
     /// it adds to a variance is of the size of the rounding that spoiled it. A matrix that is not finite stays as it
     /// is.
+    ///
+    /// ```
+    /// use inekf::filter::{Covariance, Factor};
+    /// use nalgebra::Matrix2;
+    ///
+    /// // Rounding has taken a little too much: fully correlated, and a bit more.
+    /// let spoiled = Covariance::from_upper(Matrix2::new(1.0, 1.0 + 1e-15, 0.0, 1.0));
+    /// assert!(Factor::new(spoiled.matrix()).is_none());
+    /// let mended = spoiled.made_definite();
+    /// assert!(Factor::new(mended.matrix()).is_some());
+    /// assert!((mended.matrix() - spoiled.matrix()).norm() < 1e-9);
+    /// ```
     #[must_use]
     pub fn made_definite(&self) -> Self {
         let p = self.matrix();

@@ -6,6 +6,18 @@
 use nalgebra::{SMatrix, SVector};
 
 /// L, lower triangular with a diagonal of ones, and a positive diagonal D.
+///
+/// ```
+/// use inekf::filter::Factor;
+/// use nalgebra::{Matrix2, Vector2};
+///
+/// let s = Matrix2::new(4.0, 2.0, 2.0, 3.0);
+/// let factor = Factor::new(&s).expect("positive definite");
+/// let z = Vector2::new(1.0, -1.0);
+/// assert!((s * factor.solve(&z) - z).norm() < 1e-14);
+/// // ln det S, for the likelihood of an innovation.
+/// assert!((factor.log_determinant() - 8_f64.ln()).abs() < 1e-14);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factor<const M: usize> {
     /// Below its diagonal; zero elsewhere.
@@ -18,6 +30,14 @@ pub struct Factor<const M: usize> {
 impl<const M: usize> Factor<M> {
     /// The factor of a symmetric matrix, of which the lower triangle is read. `None` if it is not positive
     /// definite, or not finite.
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::Matrix2;
+    ///
+    /// assert!(Factor::new(&Matrix2::new(1.0, 2.0, 2.0, 1.0)).is_none());
+    /// assert!(Factor::new(&Matrix2::new(1.0, f64::NAN, f64::NAN, 1.0)).is_none());
+    /// ```
     #[inline]
     pub fn new(s: &SMatrix<f64, M, M>) -> Option<Self> {
         let mut l = SMatrix::<f64, M, M>::zeros();
@@ -53,6 +73,15 @@ impl<const M: usize> Factor<M> {
     }
 
     /// The Cholesky factor, `L D^1/2`.
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::Matrix2;
+    ///
+    /// let s = Matrix2::new(4.0, 2.0, 2.0, 3.0);
+    /// let l = Factor::new(&s).expect("positive definite").l();
+    /// assert!((l * l.transpose() - s).norm() < 1e-14 && l[(0, 1)] == 0.0);
+    /// ```
     pub fn l(&self) -> SMatrix<f64, M, M> {
         let mut root = self.l;
         root.fill_diagonal(1.0);
@@ -69,6 +98,17 @@ impl<const M: usize> Factor<M> {
     }
 
     /// `L^-1 z`: `z^T S^-1 z` is the sum of its squares, each divided by its `d_i`.
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::{Matrix2, Vector2};
+    ///
+    /// let factor = Factor::new(&Matrix2::new(4.0, 2.0, 2.0, 3.0)).expect("positive definite");
+    /// let z = Vector2::new(1.0, -1.0);
+    /// let white = factor.decorrelated(&z);
+    /// let square: f64 = white.component_mul(&white).component_mul(factor.reciprocals()).sum();
+    /// assert!((square - factor.normalised_square(&z)).abs() < 1e-14);
+    /// ```
     #[inline]
     pub fn decorrelated(&self, z: &SVector<f64, M>) -> SVector<f64, M> {
         let mut w = *z;
@@ -81,6 +121,16 @@ impl<const M: usize> Factor<M> {
     }
 
     /// `B L^-T`: the rows of B, [`decorrelated`](Self::decorrelated).
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::{Matrix2, Vector2};
+    ///
+    /// let factor = Factor::new(&Matrix2::new(4.0, 2.0, 2.0, 3.0)).expect("positive definite");
+    /// let z = Vector2::new(1.0, -1.0);
+    /// // A row at a time it is `decorrelated`.
+    /// assert_eq!(factor.decorrelated_rows(&z.transpose()).transpose(), factor.decorrelated(&z));
+    /// ```
     #[inline(always)]
     pub fn decorrelated_rows<const D: usize>(&self, b: &SMatrix<f64, D, M>) -> SMatrix<f64, D, M> {
         let mut w = *b;
@@ -96,6 +146,15 @@ impl<const M: usize> Factor<M> {
     }
 
     /// `S^-1 z`.
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::{Matrix2, Vector2};
+    ///
+    /// let s = Matrix2::new(4.0, 2.0, 2.0, 3.0);
+    /// let x = Factor::new(&s).expect("positive definite").solve(&Vector2::new(6.0, 5.0));
+    /// assert!((x - Vector2::new(1.0, 1.0)).norm() < 1e-14);
+    /// ```
     #[inline]
     pub fn solve(&self, z: &SVector<f64, M>) -> SVector<f64, M> {
         let mut x = self.decorrelated(z);
@@ -111,6 +170,15 @@ impl<const M: usize> Factor<M> {
     }
 
     /// `S^-1`.
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::Matrix2;
+    ///
+    /// let s = Matrix2::new(4.0, 2.0, 2.0, 3.0);
+    /// let inverse = Factor::new(&s).expect("positive definite").inverse();
+    /// assert!((s * inverse - Matrix2::identity()).norm() < 1e-14);
+    /// ```
     #[inline]
     pub fn inverse(&self) -> SMatrix<f64, M, M> {
         let mut inverse = SMatrix::<f64, M, M>::zeros();
@@ -126,6 +194,15 @@ impl<const M: usize> Factor<M> {
     }
 
     /// `z^T S^-1 z`.
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::{Matrix2, Vector2};
+    ///
+    /// // Two standard deviations on one of two axes.
+    /// let factor = Factor::new(&Matrix2::new(4.0, 0.0, 0.0, 9.0)).expect("positive definite");
+    /// assert_eq!(factor.normalised_square(&Vector2::new(4.0, 0.0)), 4.0);
+    /// ```
     #[inline]
     pub fn normalised_square(&self, z: &SVector<f64, M>) -> f64 {
         let w = self.decorrelated(z);
@@ -137,6 +214,14 @@ impl<const M: usize> Factor<M> {
     }
 
     /// `ln det S`.
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::Matrix2;
+    ///
+    /// let factor = Factor::new(&Matrix2::new(4.0, 0.0, 0.0, 9.0)).expect("positive definite");
+    /// assert!((factor.log_determinant() - 36_f64.ln()).abs() < 1e-14);
+    /// ```
     pub fn log_determinant(&self) -> f64 {
         let product: f64 = self.pivots.iter().product();
         // One logarithm for all, unless the product leaves the numbers.

@@ -15,6 +15,13 @@ use super::update::UpdateError;
 use crate::lie::LieGroup;
 
 /// How surprising an innovation is.
+///
+/// ```
+/// use inekf::filter::{Gate, Judgement};
+///
+/// let judgement = Judgement { nis: 9.0, degrees: 3 };
+/// assert!(Gate::of_probability(0.99).admits(judgement.nis, judgement.degrees));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judgement {
     /// Normalised innovation squared.
@@ -25,6 +32,15 @@ pub struct Judgement {
 
 /// An iterate of Gauss-Newton: `xi` with its dual `eta = P^-1 xi`, which exists even where P is
 /// singular because every step lies in the range of P.
+///
+/// ```
+/// use inekf::filter::gain::Iterate;
+/// use nalgebra::Vector3;
+///
+/// // Where Gauss-Newton begins: at the prior.
+/// let start = Iterate { xi: Vector3::zeros(), eta: Vector3::zeros() };
+/// assert_eq!(start.xi.norm(), 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Iterate<const D: usize> {
     /// The correction, in the error of the belief's side.
@@ -34,6 +50,37 @@ pub struct Iterate<const D: usize> {
 }
 
 /// The gain of a filter.
+///
+/// ```
+/// use inekf::filter::{
+///     Belief, Covariance, GainRule, Left, Linearised, UpdateError, UpdateOptions, update_with,
+/// };
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::HeadingObservation;
+/// use nalgebra::{SMatrix, SVector};
+///
+/// /// Learns nothing from anything.
+/// struct Stubborn;
+///
+/// impl GainRule<SE23, 9, 1> for Stubborn {
+///     fn gain(
+///         &self,
+///         _prior: &Covariance<9>,
+///         _linearised: &Linearised<SE23, 9, 1>,
+///     ) -> Result<SMatrix<f64, 9, 1>, UpdateError> {
+///         Ok(SMatrix::zeros())
+///     }
+/// }
+///
+/// let start =
+///     Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+/// let mut belief = start;
+/// let fix = HeadingObservation { heading: 0.2, sigma: 0.1 };
+/// // The innovation is judged all the same.
+/// let correction = update_with(&mut belief, &fix, &Stubborn, &UpdateOptions::PLAIN)?;
+/// assert!(belief.mean == start.mean && correction.nis > 0.0);
+/// # Ok::<(), UpdateError>(())
+/// ```
 pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
     /// Whether the rule is the minimiser of the Kalman cost, so that a step that raises it is shortened.
     /// Others take every step as it is.
@@ -107,6 +154,21 @@ pub(super) fn kalman_gain<G: LieGroup<D>, const D: usize, const M: usize>(
 }
 
 /// The minimum of `xi^T P^-1 xi + z^T N^-1 z`.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Kalman, Left, UpdateOptions, update_with};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::HeadingObservation;
+/// use nalgebra::SVector;
+///
+/// let mut belief =
+///     Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.01)));
+/// let fix = HeadingObservation { heading: 0.2, sigma: 0.1 };
+/// update_with(&mut belief, &fix, &Kalman, &UpdateOptions::PLAIN)?;
+/// // A fix as good as what was known: half way.
+/// assert!((belief.mean.rotation.heading_rad() - 0.1).abs() < 1e-9);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kalman;
 
@@ -154,6 +216,31 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> GainRule<G, D, M> for Kalma
 ///
 /// On an [`Augmented`](crate::model::Augmented) state with `first` the dimension of the pose, the mismatches
 /// are considered: they widen S and P and never move.
+///
+/// ```
+/// use inekf::filter::{Belief, Consider, Covariance, Left, UpdateOptions, update_with};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{Augmented, OutputMismatch, PlanarFix, PointFix, Unknowns};
+/// use nalgebra::{Matrix2, Vector1, Vector2, Vector4};
+///
+/// // A source whose scale is uncertain by a tenth, a hundred metres from the origin.
+/// let unknowns = Unknowns::new::<2, 1>(&[], &[OutputMismatch::MeasurementScale { source: 0 }]).expect("fits");
+/// let mut mean = Augmented::<SE2, 3, 1, 4>::new(SE2::identity(), Vector1::new(0.0));
+/// mean.pose.position.x = 100.0;
+/// let variances = Vector4::new(0.0, 1.0, 1.0, 0.01);
+/// let mut belief = Belief::<_, Left, 4>::new(mean, Covariance::from_variances(&variances));
+/// let fix = unknowns.observe(PlanarFix::new([PointFix {
+///     position_w: Vector2::new(101.0, 0.0),
+///     covariance_w: Matrix2::identity(),
+///     lever_arm_b: Vector2::zeros(),
+///     scale_error: 0.0,
+/// }]));
+/// update_with(&mut belief, &fix, &Consider { first: 3 }, &UpdateOptions::PLAIN)?;
+/// // It counts (so little is believed) and does not move.
+/// assert_eq!(belief.mean.parameters[0], 0.0);
+/// assert!(belief.mean.pose.position.x < 100.05);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Consider {
     /// Index of the first state that is considered.

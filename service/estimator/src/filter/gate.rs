@@ -30,6 +30,14 @@ impl Gate {
     pub const OPEN: Self = Self::at(f64::INFINITY);
 
     /// Lets in what is at most `limit`, whatever the degrees.
+    ///
+    /// ```
+    /// use inekf::filter::Gate;
+    ///
+    /// let gate = Gate::at(9.0);
+    /// assert!(gate.admits(8.9, 1) && !gate.admits(9.1, 3));
+    /// assert!(Gate::OPEN.admits(1e300, 3));
+    /// ```
     pub const fn at(limit: f64) -> Self {
         let mut limits = [limit; MAX_DEGREES + 1];
         limits[0] = f64::INFINITY;
@@ -37,6 +45,14 @@ impl Gate {
     }
 
     /// Lets in what a consistent filter sees with `probability`; 1 or more lets everything in.
+    ///
+    /// ```
+    /// use inekf::filter::Gate;
+    ///
+    /// // More degrees of freedom may be further off together.
+    /// let gate = Gate::of_probability(0.95);
+    /// assert!(!gate.admits(5.0, 1) && gate.admits(5.0, 3));
+    /// ```
     pub fn of_probability(probability: f64) -> Self {
         let mut gate = Self::OPEN;
         for (degrees, limit) in gate.limits.iter_mut().enumerate().skip(1) {
@@ -46,12 +62,27 @@ impl Gate {
     }
 
     /// Whether an innovation with this normalised square is let in.
+    ///
+    /// ```
+    /// use inekf::filter::Gate;
+    ///
+    /// // An innovation of which hard constraints leave nothing is let in; one that is not a number never is.
+    /// let gate = Gate::of_probability(0.95);
+    /// assert!(gate.admits(0.0, 0) && !gate.admits(f64::NAN, 3));
+    /// ```
     pub fn admits(&self, nis: f64, degrees: usize) -> bool {
         self.limits.get(degrees).is_none_or(|limit| nis <= *limit)
     }
 }
 
 /// Probability that a chi-square variable with `degrees >= 1` degrees of freedom exceeds `x`.
+///
+/// ```
+/// use inekf::filter::gate::chi_square_survival;
+///
+/// // With two degrees of freedom it is exp(-x / 2).
+/// assert!((chi_square_survival(2, 3.0) - (-1.5_f64).exp()).abs() < 1e-12);
+/// ```
 pub fn chi_square_survival(degrees: usize, x: f64) -> f64 {
     if x <= 0.0 {
         return 1.0;
@@ -78,6 +109,14 @@ pub fn chi_square_survival(degrees: usize, x: f64) -> f64 {
 
 /// The value that a chi-square variable with `degrees >= 1` degrees of freedom stays below with
 /// `probability`; infinity for a probability of 1 or more, 0 for 0 or less.
+///
+/// ```
+/// use inekf::filter::gate::{chi_square_quantile, chi_square_survival};
+///
+/// let limit = chi_square_quantile(3, 0.999);
+/// assert!((limit - 16.266).abs() < 1e-3);
+/// assert!((chi_square_survival(3, limit) - 0.001).abs() < 1e-9);
+/// ```
 pub fn chi_square_quantile(degrees: usize, probability: f64) -> f64 {
     if probability.is_nan() || probability >= 1.0 {
         return f64::INFINITY;

@@ -20,6 +20,13 @@ use super::update::UpdateError;
 use crate::lie::LieGroup;
 
 /// Which gain goes with the H-infinity covariance.
+///
+/// ```
+/// use inekf::filter::{HInfinity, HInfinityGain};
+///
+/// let rule = HInfinity { gamma: 0.01, gain: HInfinityGain::Widened };
+/// assert_ne!(rule.gain, HInfinityGain::Kalman);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HInfinityGain {
     /// `P+ H^T N^-1`, with the widened P+.
@@ -29,6 +36,30 @@ pub enum HInfinityGain {
 }
 
 /// The H-infinity rule.
+///
+/// ```
+/// use inekf::filter::{
+///     Belief, Covariance, HInfinity, HInfinityGain, Left, UpdateError, UpdateOptions, update, update_with,
+/// };
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::HeadingObservation;
+/// use nalgebra::SVector;
+///
+/// let start =
+///     Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+/// let fix = HeadingObservation { heading: 0.2, sigma: 0.1 };
+/// let rule = |gamma| HInfinity { gamma, gain: HInfinityGain::Widened };
+/// let (mut kalman, mut robust) = (start, start);
+/// update(&mut kalman, &fix, &UpdateOptions::PLAIN)?;
+/// update_with(&mut robust, &fix, &rule(1.0), &UpdateOptions::PLAIN)?;
+/// // It trusts itself less, and the fix more.
+/// assert!(robust.covariance.matrix()[(2, 2)] > kalman.covariance.matrix()[(2, 2)]);
+/// assert!(robust.mean.rotation.heading_rad() > kalman.mean.rotation.heading_rad());
+/// // A gamma for which there is no such filter is refused, with its bound.
+/// let refused = update_with(&mut robust, &fix, &rule(1e9), &UpdateOptions::PLAIN);
+/// assert!(matches!(refused, Err(UpdateError::InfeasibleGamma { .. })));
+/// # Ok::<(), UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HInfinity {
     /// The bound on the amplification of disturbances, in 1/rad^2 and 1/m^2; 0 is the Kalman filter.

@@ -37,6 +37,35 @@ use crate::model::{Automorphism, Drift};
 pub const LEAST_SHARE: f64 = 0.03;
 
 /// What a measurement changed at its own time, to be carried on to later beliefs.
+///
+/// ```
+/// use inekf::filter::{
+///     Belief, Covariance, LateCorrection, Left, UpdateOptions, propagate_odometry, update,
+/// };
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{Drift, OdometryStep, PlanarFix, PointFix};
+/// use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+///
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+/// let move_on = |belief: &Belief<SE2, Left, 3>| propagate_odometry(belief, &step, &(Matrix3::identity() * 0.01));
+/// let fix = PlanarFix::new([PointFix {
+///     position_w: Vector2::new(0.5, -0.2),
+///     covariance_w: Matrix2::identity(),
+///     lever_arm_b: Vector2::zeros(),
+///     scale_error: 0.0,
+/// }]);
+/// let mut corrected = then;
+/// update(&mut corrected, &fix, &UpdateOptions::ITERATED)?;
+/// // The fix came when the vehicle had gone on: carried to now, it is what a replay would have given.
+/// let late = LateCorrection::between(&then, &corrected);
+/// let carried = late.carried(&Drift::none(), &move_on(&then)).expect("little was taken away");
+/// let replayed = move_on(&corrected);
+/// assert!(carried.mean.between(&replayed.mean).log().norm() < 1e-9);
+/// assert!((carried.covariance.matrix() - replayed.covariance.matrix()).norm() < 1e-9);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LateCorrection<G, S, const D: usize> {
     /// chi.

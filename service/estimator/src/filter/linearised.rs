@@ -12,6 +12,23 @@ use crate::lie::LieGroup;
 use crate::model::Observation;
 
 /// `z = H xi + v` around an iterate `chi_i = retract(chi_hat, xi_i)`, v of covariance N.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left, Linearised};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::HeadingObservation;
+/// use nalgebra::{Matrix1, SVector};
+///
+/// let belief =
+///     Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.03)));
+/// let fix = HeadingObservation { heading: 0.2, sigma: 0.1 };
+/// let noise = Matrix1::new(fix.sigma * fix.sigma);
+/// let at_prior =
+///     Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("S is definite");
+/// // S = P + N: 0.03 + 0.01; z^T S^-1 z = 0.04 / 0.04.
+/// assert!((at_prior.innovation_covariance()[(0, 0)] - 0.04).abs() < 1e-12);
+/// assert!((at_prior.normalised_square() - 1.0).abs() < 1e-9);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Linearised<G, const D: usize, const M: usize> {
     /// `chi_i`.

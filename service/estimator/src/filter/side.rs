@@ -20,6 +20,19 @@ use crate::lie::{LieGroup, SE23};
 use crate::model::{ImuIncrement, Transition};
 
 /// Which side of the estimate the error sits on, and in which coordinates.
+///
+/// ```
+/// use inekf::filter::{Left, Right, Side};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::Vector3;
+///
+/// let (chi, xi) = (SE2::exp(&Vector3::new(0.5, 3.0, 1.0)), Vector3::new(0.1, 0.2, -0.3));
+/// assert_eq!(Left::retract(&chi, &xi), chi * SE2::exp(&xi));
+/// assert_eq!(Right::retract(&chi, &xi), SE2::exp(&xi) * chi);
+/// // On either side the difference undoes it.
+/// assert!((Left::difference(&chi, &Left::retract(&chi, &xi)) - xi).norm() < 1e-12);
+/// assert!((Right::difference(&chi, &Right::retract(&chi, &xi)) - xi).norm() < 1e-12);
+/// ```
 pub trait Side: Copy + Clone + Debug + PartialEq {
     /// The chart in which a smoother with this parametrisation writes the residual of a motion, so that what is
     /// compared is what its users compare: the group's logarithm in body axes for both exponentials, uncoupled
@@ -28,13 +41,44 @@ pub trait Side: Copy + Clone + Debug + PartialEq {
     type Residual: Side;
 
     /// The group element that lies `xi` away from `chi`.
+    ///
+    /// ```
+    /// use inekf::filter::{Additive, Side};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// // The plain EKF's: the position is added to in world axes, whatever the heading.
+    /// let here = SE2::exp(&Vector3::new(1.0, 0.0, 0.0));
+    /// let there = Additive::retract(&here, &Vector3::new(0.0, 2.0, 0.0));
+    /// assert!((there.position - here.position - Vector2::new(2.0, 0.0)).norm() < 1e-12);
+    /// ```
     fn retract<G: LieGroup<D>, const D: usize>(chi: &G, xi: &SVector<f64, D>) -> G;
 
     /// The `xi` with `retract(chi_hat, xi) = chi`.
+    ///
+    /// ```
+    /// use inekf::filter::{Left, Side};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let (hat, chi) = (SE2::exp(&Vector3::new(0.5, 3.0, 1.0)), SE2::exp(&Vector3::new(0.6, 3.0, 1.2)));
+    /// // Both ways they are opposite.
+    /// assert!((Left::difference(&hat, &chi) + Left::difference(&chi, &hat)).norm() < 1e-12);
+    /// ```
     fn difference<G: LieGroup<D>, const D: usize>(chi_hat: &G, chi: &G) -> SVector<f64, D>;
 
     /// J with `retract(chi, xi + d) = retract(retract(chi, xi), J d)` to first order: it carries
     /// an error written around `chi` to the point `xi` away from it.
+    ///
+    /// ```
+    /// use inekf::filter::{Left, Side};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// // On the left it is the right Jacobian of the group.
+    /// let xi = Vector3::new(0.5, 3.0, 1.0);
+    /// assert_eq!(Left::jacobian::<SE2, 3>(&xi), SE2::right_jacobian(&xi));
+    /// ```
     fn jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D>;
 
     /// K with `difference(retract(chi, e), retract(chi, xi)) = xi - J^-1 K e` to first order in e, J the
@@ -42,9 +86,28 @@ pub trait Side: Copy + Clone + Debug + PartialEq {
     fn origin_jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D>;
 
     /// A, with `xi_side = A xi_left` at `chi`, to first order.
+    ///
+    /// ```
+    /// use inekf::filter::{Right, Side};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let chi = SE2::exp(&Vector3::new(0.5, 3.0, 1.0));
+    /// assert_eq!(Right::from_left(&chi), chi.adjoint());
+    /// ```
     fn from_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D>;
 
     /// `A^-1`, with `xi_left = A^-1 xi_side` at `chi`, to first order.
+    ///
+    /// ```
+    /// use inekf::filter::{Additive, Side};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let chi = SE2::exp(&Vector3::new(0.5, 3.0, 1.0));
+    /// let there_and_back = Additive::to_left(&chi) * Additive::from_left(&chi);
+    /// assert!((there_and_back - Matrix3::identity()).norm() < 1e-12);
+    /// ```
     fn to_left<G: LieGroup<D>, const D: usize>(chi: &G) -> SMatrix<f64, D, D>;
 
     /// Whether the error is the left-invariant one already, to first order, so that changes of
@@ -59,10 +122,32 @@ pub trait InertialSide: LateSide {
 }
 
 /// `chi = chi_hat exp(xi)`.
+///
+/// ```
+/// use inekf::filter::{Left, Side};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::Vector3;
+///
+/// // The error is seen from the body: it does not change if both are moved from the world's side.
+/// let (hat, chi) = (SE2::exp(&Vector3::new(0.5, 3.0, 1.0)), SE2::exp(&Vector3::new(0.6, 3.0, 1.2)));
+/// let moved = SE2::exp(&Vector3::new(2.0, -7.0, 5.0));
+/// assert!((Left::difference(&(moved * hat), &(moved * chi)) - Left::difference(&hat, &chi)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Left;
 
 /// `chi = exp(xi) chi_hat`.
+///
+/// ```
+/// use inekf::filter::{Right, Side};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::Vector3;
+///
+/// // And this one does not if both are moved from the body's.
+/// let (hat, chi) = (SE2::exp(&Vector3::new(0.5, 3.0, 1.0)), SE2::exp(&Vector3::new(0.6, 3.0, 1.2)));
+/// let moved = SE2::exp(&Vector3::new(2.0, -7.0, 5.0));
+/// assert!((Right::difference(&(hat * moved), &(chi * moved)) - Right::difference(&hat, &chi)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Right;
 

@@ -29,6 +29,14 @@ use crate::lie::LieGroup;
 use crate::model::Observation;
 
 /// What happens to the covariance when the estimate moves.
+///
+/// ```
+/// use inekf::filter::{Transport, UpdateOptions};
+///
+/// // The papers' plain filter leaves it; this library's default carries it.
+/// assert_eq!(UpdateOptions::PLAIN.transport, Transport::None);
+/// assert_ne!(UpdateOptions::ITERATED.transport, UpdateOptions::PLAIN.transport);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
     /// Carried to the new linearisation point by the Jacobian of the correction.
@@ -38,6 +46,14 @@ pub enum Transport {
 }
 
 /// How an update is done.
+///
+/// ```
+/// use inekf::filter::{Gate, UpdateOptions};
+///
+/// let options = UpdateOptions { gate: Gate::of_probability(0.99), ..UpdateOptions::ITERATED };
+/// assert!(options.iterations > UpdateOptions::PLAIN.iterations);
+/// assert_eq!(UpdateOptions::PLAIN.iterations, 1);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UpdateOptions {
     /// Most Gauss-Newton iterations; 1 is the plain Kalman update.
@@ -70,6 +86,23 @@ impl UpdateOptions {
 }
 
 /// Whether an observation was used.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Gate, Left, UpdateOptions, Verdict, update};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::VelocityObservation;
+/// use nalgebra::{Matrix3, SVector, Vector3};
+///
+/// let mut belief =
+///     Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.01)));
+/// let before = belief;
+/// // 50 m/s too fast, where 0.1 m/s were sure: refused, and nothing is changed.
+/// let wrong = VelocityObservation { velocity_w: Vector3::new(50.0, 0.0, 0.0), covariance_w: Matrix3::identity() };
+/// let options = UpdateOptions { gate: Gate::of_probability(0.999), ..UpdateOptions::ITERATED };
+/// assert_eq!(update(&mut belief, &wrong, &options)?.verdict, Verdict::Gated);
+/// assert_eq!(belief, before);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The belief was corrected.
@@ -79,6 +112,23 @@ pub enum Verdict {
 }
 
 /// What an update did.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left, UpdateOptions, update};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::VelocityObservation;
+/// use nalgebra::{Matrix3, SVector, Vector3};
+///
+/// let mut belief =
+///     Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(1.0)));
+/// let fix = VelocityObservation { velocity_w: Vector3::new(2.0, 0.0, 0.0), covariance_w: Matrix3::identity() };
+/// let correction = update(&mut belief, &fix, &UpdateOptions::PLAIN)?;
+/// // S = P + N = 2 on each axis: z^T S^-1 z = 4 / 2; half of the innovation is taken over.
+/// assert!((correction.nis - 2.0).abs() < 1e-12 && correction.degrees == 3);
+/// assert!((correction.log_determinant - 8_f64.ln()).abs() < 1e-12);
+/// assert!((correction.xi[3] - 1.0).abs() < 1e-12);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Correction<const D: usize> {
     /// Whether the observation was used.
@@ -97,6 +147,21 @@ pub struct Correction<const D: usize> {
 }
 
 /// Why an update could not be computed; the belief is unchanged.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left, UpdateOptions, update};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::VelocityObservation;
+/// use nalgebra::{Matrix3, SVector, Vector3};
+///
+/// let mut belief =
+///     Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(1.0)));
+/// let before = belief;
+/// // A noise that is none: the update says so, and leaves the belief as it was.
+/// let broken = VelocityObservation { velocity_w: Vector3::zeros(), covariance_w: Matrix3::identity() * -2.0 };
+/// assert!(update(&mut belief, &broken, &UpdateOptions::PLAIN).is_err());
+/// assert_eq!(belief, before);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum UpdateError {
     /// The innovation covariance is not positive definite: a noise that is not, or a broken P.
@@ -183,6 +248,27 @@ const MAX_TRIALS: usize = 11;
 ///
 /// # Errors
 /// [`UpdateError`]; the belief is then unchanged, as it is when the observation is gated.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left, UpdateOptions, update};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{PlanarFix, PointFix};
+/// use nalgebra::{Matrix2, Vector2, Vector3};
+///
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 4.0, 4.0));
+/// let mut belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let fix = PlanarFix::new([PointFix {
+///     position_w: Vector2::new(1.0, 0.0),
+///     covariance_w: Matrix2::identity() * 4.0,
+///     lever_arm_b: Vector2::zeros(),
+///     scale_error: 0.0,
+/// }]);
+/// update(&mut belief, &fix, &UpdateOptions::ITERATED)?;
+/// // As good as what was known: half way.
+/// assert!((belief.mean.position - Vector2::new(0.5, 0.0)).norm() < 1e-9);
+/// assert!((belief.covariance.matrix()[(1, 1)] - 2.0).abs() < 1e-9);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 pub fn update<G, S, O, const D: usize, const M: usize>(
     belief: &mut Belief<G, S, D>,
     observation: &O,
@@ -200,6 +286,23 @@ where
 ///
 /// # Errors
 /// [`UpdateError`]; the belief is then unchanged, as it is when the observation is gated.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Kalman, Left, UpdateOptions, update, update_with};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::HeadingObservation;
+/// use nalgebra::SVector;
+///
+/// let start =
+///     Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+/// let fix = HeadingObservation { heading: 0.2, sigma: 0.1 };
+/// let (mut by_rule, mut plain) = (start, start);
+/// update_with(&mut by_rule, &fix, &Kalman, &UpdateOptions::ITERATED)?;
+/// update(&mut plain, &fix, &UpdateOptions::ITERATED)?;
+/// // The Kalman gain is the default.
+/// assert_eq!(by_rule, plain);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 pub fn update_with<G, S, O, L, const D: usize, const M: usize>(
     belief: &mut Belief<G, S, D>,
     observation: &O,

@@ -11,6 +11,15 @@ use super::so2::SO2;
 use super::{LieGroup, multiply_by_composing};
 
 /// A pose in the plane.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2, SO2};
+/// use nalgebra::Vector2;
+///
+/// let pose = SE2 { rotation: SO2::from_angle(90_f64.to_radians()), position: Vector2::new(3.0, 0.0) };
+/// // Tangent order theta, x, y; a pure turn of the same angle has the same logarithm's first entry.
+/// assert!((pose.log().x.to_degrees() - 90.0).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SE2 {
     /// The rotation, body to world.

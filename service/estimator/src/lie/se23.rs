@@ -11,6 +11,21 @@ use super::so3::{SO3, left_jacobian_inverse_times};
 use super::{LieGroup, multiply_by_composing, sek3};
 
 /// An extended pose: attitude, velocity and position of a body in the world.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23, SO3};
+/// use nalgebra::Vector3;
+///
+/// let chi = SE23 {
+///     rotation: SO3::from_roll_pitch_heading(0.0, 0.0, 90_f64.to_radians()),
+///     velocity: Vector3::new(0.0, 5.0, 0.0), // northwards
+///     position: Vector3::zeros(),
+/// };
+/// // Facing north it drives forwards.
+/// assert!((chi.rotation.inverse_rotate(&chi.velocity) - Vector3::new(5.0, 0.0, 0.0)).norm() < 1e-12);
+/// // Rotation, velocity, position.
+/// assert_eq!(SE23 { rotation: SO3::identity(), ..chi }.log()[4], 5.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SE23 {
     /// The rotation, body to world.

@@ -11,6 +11,15 @@ use super::so3::{SO3, left_jacobian_inverse_times};
 use super::{LieGroup, multiply_by_composing, sek3};
 
 /// A pose: attitude and position of a body in the world.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE3, SO3};
+/// use nalgebra::Vector3;
+///
+/// let pose = SE3 { rotation: SO3::identity(), position: Vector3::new(1.0, 2.0, 3.0) };
+/// // Rotation first, then position.
+/// assert_eq!(pose.log().as_slice(), [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SE3 {
     /// The rotation, body to world.

@@ -76,6 +76,16 @@ fn horner<const TERMS: usize>(coefficients: &[f64; TERMS], t: f64) -> f64 {
 }
 
 /// `S_0 ..= S_6` at `t = theta^2 >= 0`, each to double precision.
+///
+/// ```
+/// use inekf::lie::series::entire;
+///
+/// let theta = 0.7_f64;
+/// let s = entire(theta * theta);
+/// assert!((s[0] - theta.cos()).abs() < 1e-15 && (s[1] - theta.sin() / theta).abs() < 1e-15);
+/// // At zero they are 1/k!, without a division by zero.
+/// assert_eq!(entire(0.0)[..4], [1.0, 1.0, 0.5, 1.0 / 6.0]);
+/// ```
 #[inline]
 #[must_use]
 pub fn entire(t: f64) -> [f64; COUNT] {
@@ -104,6 +114,14 @@ pub fn entire(t: f64) -> [f64; COUNT] {
 }
 
 /// `S_0 = cos(theta)` and `S_1 = sin(theta) / theta` alone, at `t = theta^2 >= 0`.
+///
+/// ```
+/// use inekf::lie::series::cos_sinc;
+///
+/// assert_eq!(cos_sinc(0.0), (1.0, 1.0));
+/// let (cos, sinc) = cos_sinc(4.0);
+/// assert!((cos - 2_f64.cos()).abs() < 1e-15 && (sinc - 2_f64.sin() / 2.0).abs() < 1e-15);
+/// ```
 #[inline]
 #[must_use]
 pub fn cos_sinc(t: f64) -> (f64, f64) {
@@ -124,6 +142,15 @@ pub fn cos_sinc(t: f64) -> (f64, f64) {
 ///
 /// `c = (1 - (theta/2) cot(theta/2)) / t`, written with `u = t/4` as `(S_2(u) - S_3(u)) / (4 S_1(u))`: no
 /// difference of nearly equal numbers at 0, and no division by `sin(pi)`. It is infinite at 2 pi.
+///
+/// ```
+/// use inekf::lie::series::inverse_jacobian_coefficient;
+///
+/// assert!((inverse_jacobian_coefficient(0.0) - 1.0 / 12.0).abs() < 1e-15);
+/// // Also where sin(theta) vanishes.
+/// let pi = std::f64::consts::PI;
+/// assert!((inverse_jacobian_coefficient(pi * pi) - 1.0 / (pi * pi)).abs() < 1e-15);
+/// ```
 #[inline]
 #[must_use]
 pub fn inverse_jacobian_coefficient(t: f64) -> f64 {
@@ -145,6 +172,18 @@ pub fn inverse_jacobian_coefficient(t: f64) -> f64 {
 /// The functions `S_k` at one rotation vector, ready for any of the integrals `Gamma_m`.
 ///
 /// `M` is the index of `Gamma_M`: 0, 1 or 2 (another one does not compile).
+///
+/// ```
+/// use inekf::lie::series::RotationSeries;
+/// use inekf::lie::{LieGroup, SO3};
+/// use nalgebra::Vector3;
+///
+/// // Gamma_0 is the rotation, Gamma_1 the left Jacobian.
+/// let phi = Vector3::new(0.3, -0.5, 0.8);
+/// let series = RotationSeries::at(&phi);
+/// assert!((series.gamma::<0>() - SO3::exp(&phi).matrix()).norm() < 1e-14);
+/// assert!((series.gamma::<1>() - SO3::left_jacobian(&phi)).norm() < 1e-14);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct RotationSeries {
     phi: Vector3<f64>,
@@ -183,6 +222,15 @@ impl RotationSeries {
     }
 
     /// The matrix `Gamma_M(phi)`.
+    ///
+    /// ```
+    /// use inekf::lie::series::RotationSeries;
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// // Without a turn: 1/m!.
+    /// let series = RotationSeries::at(&Vector3::zeros());
+    /// assert_eq!(series.gamma::<2>(), Matrix3::identity() * 0.5);
+    /// ```
     #[must_use]
     #[inline]
     pub fn gamma<const M: usize>(&self) -> Matrix3<f64> {
@@ -208,6 +256,15 @@ impl RotationSeries {
     }
 
     /// The vector `Gamma_M(phi) a`, without forming the matrix.
+    ///
+    /// ```
+    /// use inekf::lie::series::RotationSeries;
+    /// use nalgebra::Vector3;
+    ///
+    /// let (phi, a) = (Vector3::new(0.3, -0.5, 0.8), Vector3::new(1.0, 2.0, 3.0));
+    /// let series = RotationSeries::at(&phi);
+    /// assert!((series.gamma_times::<2>(&a) - series.gamma::<2>() * a).norm() < 1e-14);
+    /// ```
     #[inline]
     #[must_use]
     pub fn gamma_times<const M: usize>(&self, a: &Vector3<f64>) -> Vector3<f64> {
@@ -219,6 +276,17 @@ impl RotationSeries {
     /// The derivative of the vector `Gamma_M(phi) a` by `phi`, with `a` held.
     ///
     /// Column `j` is the change of the vector per radian of `phi_j`.
+    ///
+    /// ```
+    /// use inekf::lie::series::RotationSeries;
+    /// use nalgebra::Vector3;
+    ///
+    /// let (phi, a) = (Vector3::new(0.3, -0.5, 0.8), Vector3::new(1.0, 2.0, 3.0));
+    /// let value = |phi: Vector3<f64>| RotationSeries::at(&phi).gamma_times::<1>(&a);
+    /// let slope = (value(phi + Vector3::x() * 1e-6) - value(phi - Vector3::x() * 1e-6)) / 2e-6;
+    /// let derivative = RotationSeries::at(&phi).gamma_times_derivative::<1>(&a);
+    /// assert!((derivative.column(0) - slope).norm() < 1e-8);
+    /// ```
     #[must_use]
     #[inline]
     pub fn gamma_times_derivative<const M: usize>(&self, a: &Vector3<f64>) -> Matrix3<f64> {
@@ -254,6 +322,16 @@ impl RotationSeries {
     /// For `M = 1` this is the off-diagonal block `Q(phi, rho)` of the left Jacobian of SE(3)
     /// (Barfoot and Furgale 2014), whose quartic products collapse by
     /// `hat(a) hat(b) hat(a) = -(a . b) hat(a)`.
+    ///
+    /// ```
+    /// use inekf::lie::series::RotationSeries;
+    /// use nalgebra::Vector3;
+    ///
+    /// let (phi, rho) = (Vector3::new(0.3, -0.5, 0.8), Vector3::new(1.0, 2.0, 3.0));
+    /// let value = |s: f64| RotationSeries::at(&(phi + rho * s)).gamma::<1>();
+    /// let slope = (value(1e-6) - value(-1e-6)) / 2e-6;
+    /// assert!((RotationSeries::at(&phi).gamma_along::<1>(&rho) - slope).norm() < 1e-8);
+    /// ```
     #[must_use]
     #[inline]
     pub fn gamma_along<const M: usize>(&self, rho: &Vector3<f64>) -> Matrix3<f64> {
@@ -275,12 +353,31 @@ impl RotationSeries {
 }
 
 /// The matrix `Gamma_M(phi)`, `phi` in radians; see [`RotationSeries::gamma`].
+///
+/// ```
+/// use inekf::lie::series::gamma;
+/// use nalgebra::Vector3;
+///
+/// // Under a constant turn and force the velocity grows by Gamma_1(w dt) a dt: along the axis as if there were no turn.
+/// let phi = Vector3::new(0.0, 0.0, 1.0);
+/// assert!((gamma::<1>(&phi) * Vector3::z() - Vector3::z()).norm() < 1e-15);
+/// ```
 #[must_use]
 pub fn gamma<const M: usize>(phi: &Vector3<f64>) -> Matrix3<f64> {
     RotationSeries::at(phi).gamma::<M>()
 }
 
 /// The derivative of `Gamma_M(phi) a` by `phi`; see [`RotationSeries::gamma_times_derivative`].
+///
+/// ```
+/// use inekf::lie::series::gamma_times_derivative;
+/// use inekf::lie::hat;
+/// use nalgebra::Vector3;
+///
+/// // At zero d(Exp(phi) a) = -hat(a) d phi.
+/// let a = Vector3::new(1.0, 2.0, 3.0);
+/// assert!((gamma_times_derivative::<0>(&Vector3::zeros(), &a) + hat(&a)).norm() < 1e-15);
+/// ```
 #[must_use]
 #[inline]
 pub fn gamma_times_derivative<const M: usize>(

@@ -24,6 +24,13 @@ pub struct SO2 {
 
 impl SO2 {
     /// The rotation by an angle in radians, counter-clockwise.
+    ///
+    /// ```
+    /// use inekf::lie::SO2;
+    ///
+    /// // 350 degrees to the left are ten to the right.
+    /// assert!((SO2::from_angle(350_f64.to_radians()).angle_rad().to_degrees() + 10.0).abs() < 1e-9);
+    /// ```
     #[must_use]
     pub fn from_angle(theta_rad: f64) -> Self {
         let (sin, cos) = theta_rad.sin_cos();
@@ -43,6 +50,14 @@ impl SO2 {
     }
 
     /// Takes a vector from body to world coordinates, `R a`.
+    ///
+    /// ```
+    /// use inekf::lie::SO2;
+    /// use nalgebra::Vector2;
+    ///
+    /// let (r_wb, a) = (SO2::from_angle(0.3), Vector2::new(1.0, 2.0));
+    /// assert!((r_wb.rotate(&a) - r_wb.matrix() * a).norm() < 1e-15);
+    /// ```
     #[must_use]
     pub fn rotate(&self, a: &Vector2<f64>) -> Vector2<f64> {
         Vector2::new(
@@ -52,6 +67,14 @@ impl SO2 {
     }
 
     /// Takes a vector from world to body coordinates, `R^T a`.
+    ///
+    /// ```
+    /// use inekf::lie::SO2;
+    /// use nalgebra::Vector2;
+    ///
+    /// let (r_wb, a) = (SO2::from_angle(0.3), Vector2::new(1.0, 2.0));
+    /// assert!((r_wb.inverse_rotate(&r_wb.rotate(&a)) - a).norm() < 1e-15);
+    /// ```
     #[must_use]
     pub fn inverse_rotate(&self, a: &Vector2<f64>) -> Vector2<f64> {
         Vector2::new(

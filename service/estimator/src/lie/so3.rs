@@ -13,6 +13,14 @@ use super::{LieGroup, RotationError, multiply_by_composing};
 const MATRIX_TOLERANCE: f64 = 0.1;
 
 /// The skew matrix of a vector: `hat(a) b = a x b`.
+///
+/// ```
+/// use inekf::lie::hat;
+/// use nalgebra::Vector3;
+///
+/// let (a, b) = (Vector3::new(1.0, 2.0, 3.0), Vector3::new(-1.0, 0.5, 2.0));
+/// assert_eq!(hat(&a) * b, a.cross(&b));
+/// ```
 #[must_use]
 #[inline]
 pub fn hat(a: &Vector3<f64>) -> Matrix3<f64> {
@@ -22,6 +30,15 @@ pub fn hat(a: &Vector3<f64>) -> Matrix3<f64> {
 /// The rotation that takes body coordinates to world coordinates.
 ///
 /// Two rotations are equal when their stored numbers are, up to the common sign of the quaternion.
+///
+/// ```
+/// use inekf::lie::SO3;
+///
+/// // A quaternion and its negative are the same rotation.
+/// let q = SO3::from_quaternion_xyzw([0.0, 0.0, 0.6, 0.8])?;
+/// assert_eq!(q, SO3::from_quaternion_xyzw([0.0, 0.0, -0.6, -0.8])?);
+/// # Ok::<(), inekf::lie::RotationError>(())
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct SO3 {
     /// The vector part `x, y, z`: the axis times the sine of half the angle.
@@ -56,6 +73,13 @@ impl SO3 {
     }
 
     /// The unit quaternion `x, y, z, w` (Hamilton, body to world); its sign carries no meaning.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SO3};
+    ///
+    /// // Scalar last.
+    /// assert_eq!(SO3::identity().quaternion_xyzw(), [0.0, 0.0, 0.0, 1.0]);
+    /// ```
     #[must_use]
     pub fn quaternion_xyzw(&self) -> [f64; 4] {
         [self.vector.x, self.vector.y, self.vector.z, self.w]
@@ -68,6 +92,18 @@ impl SO3 {
     /// # Errors
     /// If an entry is not finite, or if some entry is more than 0.1 away from the nearest rotation: a
     /// reflection, a matrix with a scale, or not a rotation at all.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SO3};
+    /// use nalgebra::Vector3;
+    ///
+    /// let r_wb = SO3::exp(&Vector3::new(0.3, -0.5, 0.8));
+    /// // Three digits, as a file may have them: the nearest rotation.
+    /// let rounded = r_wb.matrix().map(|entry| (entry * 1e3).round() / 1e3);
+    /// let found = SO3::from_matrix(&rounded)?;
+    /// assert!(r_wb.between(&found).log().norm() < 1e-3);
+    /// # Ok::<(), inekf::lie::RotationError>(())
+    /// ```
     pub fn from_matrix(matrix: &Matrix3<f64>) -> Result<Self, RotationError> {
         if !matrix.iter().all(|entry| entry.is_finite()) {
             return Err(RotationError::NotFinite);
@@ -125,6 +161,14 @@ impl SO3 {
 
     /// The heading in radians, in `[-pi, pi]`: the direction of the body's x axis on the ground,
     /// counter-clockwise from the world's x axis. It is meaningless where x points straight up or down.
+    ///
+    /// ```
+    /// use inekf::lie::SO3;
+    ///
+    /// // A roll and a pitch do not turn the heading.
+    /// let r_wb = SO3::from_roll_pitch_heading(0.2, -0.3, 1.0);
+    /// assert!((r_wb.heading_rad() - 1.0).abs() < 1e-12);
+    /// ```
     #[must_use]
     pub fn heading_rad(&self) -> f64 {
         let [x, y, z, w] = self.quaternion_xyzw();
@@ -132,6 +176,15 @@ impl SO3 {
     }
 
     /// The rotation matrix, body to world: its columns are the body's axes in world coordinates.
+    ///
+    /// ```
+    /// use inekf::lie::SO3;
+    /// use nalgebra::Vector3;
+    ///
+    /// let r_wb = SO3::from_roll_pitch_heading(0.0, 0.0, 90_f64.to_radians());
+    /// // The first column is the body's x axis in the world: north.
+    /// assert!((r_wb.matrix().column(0) - Vector3::y()).norm() < 1e-12);
+    /// ```
     #[inline]
     #[must_use]
     pub fn matrix(&self) -> Matrix3<f64> {
@@ -150,6 +203,15 @@ impl SO3 {
     }
 
     /// Takes a vector from body to world coordinates, `R a`.
+    ///
+    /// ```
+    /// use inekf::lie::SO3;
+    /// use nalgebra::Vector3;
+    ///
+    /// // Nose down by a positive pitch.
+    /// let r_wb = SO3::from_roll_pitch_heading(0.0, 0.1, 0.0);
+    /// assert!(r_wb.rotate(&Vector3::x()).z < 0.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {
@@ -158,6 +220,15 @@ impl SO3 {
     }
 
     /// Takes a vector from world to body coordinates, `R^T a`.
+    ///
+    /// ```
+    /// use inekf::lie::SO3;
+    /// use nalgebra::Vector3;
+    ///
+    /// // What a level accelerometer at rest feels of gravity is up; rolled to the right it is partly on its left.
+    /// let r_wb = SO3::from_roll_pitch_heading(0.1, 0.0, 0.0);
+    /// assert!(r_wb.inverse_rotate(&Vector3::new(0.0, 0.0, 9.80665)).y > 0.0);
+    /// ```
     #[inline]
     #[must_use]
     pub fn inverse_rotate(&self, a: &Vector3<f64>) -> Vector3<f64> {

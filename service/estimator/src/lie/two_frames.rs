@@ -21,6 +21,15 @@ use super::so3::{SO3, left_jacobian_inverse_times};
 use super::{LieGroup, multiply_by_composing, sek3};
 
 /// Attitude, velocity and position of a body in the world, and the biases of its inertial sensors.
+///
+/// ```
+/// use inekf::lie::{LieGroup, TwoFrames};
+/// use nalgebra::SVector;
+///
+/// // Biases are body vectors: composed, those of the second are turned like everything else of its body.
+/// let first = TwoFrames::exp(&SVector::<f64, 15>::from_fn(|i, _| 0.05 * i as f64));
+/// assert!(first.compose(&first.inverse()).log().norm() < 1e-12);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TwoFrames {
     /// The rotation, body to world.

@@ -8,6 +8,17 @@ use nalgebra::{SMatrix, SVector};
 use crate::lie::LieGroup;
 
 /// Pose and parameters.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::Augmented;
+/// use nalgebra::Vector1;
+///
+/// // A pose with a scale error beside it: a direct product.
+/// let state = Augmented::<SE2, 3, 1, 4>::new(SE2::identity(), Vector1::new(0.1));
+/// assert_eq!(state.compose(&state).parameters[0], 0.2);
+/// assert_eq!(state.log()[3], 0.1);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Augmented<G, const B: usize, const P: usize, const D: usize> {
     /// The pose, of dimension B.

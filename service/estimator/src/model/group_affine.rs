@@ -12,6 +12,18 @@ use nalgebra::SMatrix;
 use crate::lie::{LieGroup, SE23};
 
 /// A bijective map of the group onto itself with `phi(a b) = phi(a) phi(b)`.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Automorphism, FreeMotion};
+/// use nalgebra::SVector;
+///
+/// // phi(a b) = phi(a) phi(b).
+/// let phi = FreeMotion { dt_s: 0.5 };
+/// let (a, b) = (SE23::exp(&SVector::repeat(0.3)), SE23::exp(&SVector::from_fn(|i, _| 0.1 * i as f64)));
+/// let (whole, parts) = (phi.apply(&a.compose(&b)), phi.apply(&a).compose(&phi.apply(&b)));
+/// assert!(whole.between(&parts).log().norm() < 1e-12);
+/// ```
 pub trait Automorphism<G: LieGroup<D>, const D: usize> {
     /// `phi(chi)`.
     fn apply(&self, chi: &G) -> G;
@@ -30,6 +42,15 @@ pub trait Automorphism<G: LieGroup<D>, const D: usize> {
 }
 
 /// Motion without force for `dt_s` seconds on SE_2(3): the position advances by `v_w * dt_s`.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Automorphism, FreeMotion};
+/// use nalgebra::Vector3;
+///
+/// let gliding = SE23 { velocity: Vector3::new(3.0, 0.0, 0.0), ..SE23::identity() };
+/// assert_eq!(FreeMotion { dt_s: 2.0 }.apply(&gliding).position.x, 6.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeMotion {
     /// Duration of the step, s.
@@ -80,6 +101,21 @@ impl Automorphism<SE23, 9> for FreeMotion {
 }
 
 /// One step `chi+ = W * phi(chi) * U`.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{FreeMotion, GroupAffineStep};
+/// use nalgebra::SVector;
+///
+/// let (world, body) = (SE23::exp(&SVector::repeat(0.1)), SE23::exp(&SVector::from_fn(|i, _| 0.05 * i as f64)));
+/// let step = GroupAffineStep::new(world, FreeMotion { dt_s: 0.2 }, body);
+/// // The error goes through it exactly, wherever the estimate is: xi+ = F xi, for an error of any size.
+/// let xi = SVector::<f64, 9>::from_fn(|i, _| 0.2 - 0.04 * i as f64);
+/// for chi in [SE23::identity(), SE23::exp(&SVector::repeat(0.7))] {
+///     let error = step.apply(&chi).between(&step.apply(&chi.compose(&SE23::exp(&xi))));
+///     assert!((error.log() - step.left_jacobian() * xi).norm() < 1e-12);
+/// }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroupAffineStep<G, A, const D: usize> {
     /// W (Gamma in \[IS\]): acts from the world side, e.g. gravity.
@@ -116,6 +152,17 @@ impl<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize> GroupAffineStep<G, A
     }
 
     /// F, D x D, of the right-invariant error: `Ad_W M`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{FreeMotion, GroupAffineStep};
+    /// use nalgebra::SVector;
+    ///
+    /// // The world's share alone decides: another sample of the body leaves it as it is.
+    /// let step = |body| GroupAffineStep::new(SE23::exp(&SVector::repeat(0.1)), FreeMotion { dt_s: 0.2 }, body);
+    /// let other = SE23::exp(&SVector::repeat(-0.4));
+    /// assert_eq!(step(SE23::identity()).right_jacobian(), step(other).right_jacobian());
+    /// ```
     pub fn right_jacobian(&self) -> SMatrix<f64, D, D> {
         self.automorphism.times_differential(self.world.adjoint())
     }

@@ -16,6 +16,18 @@ use crate::lanes::Block;
 use crate::lie::{LieGroup, SE23, SO3};
 
 /// How an interval with constant rates becomes a step.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Discretisation, ImuInput, ImuStep};
+/// use nalgebra::Vector3;
+///
+/// let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(1.0, 0.0, 0.0) };
+/// let moved = |scheme| ImuStep::new(&push, &Vector3::zeros(), 2.0, scheme).apply(&SE23::identity());
+/// // The papers' scheme lacks a dt^2 / 2 in the position.
+/// assert_eq!(moved(Discretisation::Euler).position.x, 0.0);
+/// assert!((moved(Discretisation::ZeroOrderHold).position.x - 2.0).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Discretisation {
     /// Exact for angular rate and specific force constant over the interval.
@@ -25,6 +37,14 @@ pub enum Discretisation {
 }
 
 /// Angular rate and specific force of the body over one interval.
+///
+/// ```
+/// use inekf::model::ImuInput;
+/// use nalgebra::Vector3;
+///
+/// let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+/// assert_eq!(at_rest.midpoint(&at_rest), at_rest);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuInput {
     /// Angular rate in the body frame, rad/s.
@@ -47,6 +67,21 @@ impl ImuInput {
 /// Power spectral densities of the white noises that drive the error.
 ///
 /// A discrete standard deviation `sigma` per sample of length `dt` is the density `sigma^2 dt`.
+///
+/// ```
+/// use inekf::model::ImuNoise;
+///
+/// // A data sheet's 0.01 deg/s/sqrt(Hz) and 100 ug/sqrt(Hz): densities are squared.
+/// let (gyro, accel) = (0.01_f64.to_radians(), 100e-6 * 9.80665);
+/// let noise = ImuNoise {
+///     gyro_psd: gyro * gyro,
+///     accel_psd: accel * accel,
+///     gyro_bias_psd: 0.0,
+///     accel_bias_psd: 0.0,
+/// };
+/// // 0.1 deg/s in each sample at 100 Hz.
+/// assert!(((noise.gyro_psd * 100.0).sqrt().to_degrees() - 0.1).abs() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuNoise {
     /// Gyroscope, (rad/s)^2/Hz.
@@ -109,6 +144,18 @@ impl ImuStep {
 
     /// Covariance, 9 x 9, that the white noise of the input adds to the left-invariant error:
     /// `B diag(psd) B^T / dt`, exactly symmetric; zero for an interval of no length.
+    ///
+    /// ```
+    /// use inekf::model::{Discretisation, ImuInput, ImuNoise, ImuStep};
+    /// use nalgebra::Vector3;
+    ///
+    /// let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// let noise = ImuNoise { gyro_psd: 0.0, accel_psd: 0.01, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// let step = ImuStep::new(&at_rest, &Vector3::zeros(), 0.5, Discretisation::ZeroOrderHold);
+    /// // Velocity is a random walk: the density by the time.
+    /// let q = step.noise_covariance(&noise);
+    /// assert!((q[(3, 3)] - 0.01 * 0.5).abs() < 1e-15 && q == q.transpose());
+    /// ```
     pub fn noise_covariance(&self, noise: &ImuNoise) -> SMatrix<f64, 9, 9> {
         if self.dt_s <= 0.0 {
             return SMatrix::zeros();

@@ -20,6 +20,20 @@ use crate::lie::series::RotationSeries;
 use crate::lie::{LieGroup, SE23, SO3};
 
 /// The motion over one interval; SI units, radians.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Discretisation, ImuIncrement, ImuInput, ImuStep};
+/// use nalgebra::Vector3;
+///
+/// let input = ImuInput { omega_b: Vector3::new(0.1, 0.2, 0.3), force_b: Vector3::new(1.0, 0.0, 9.8) };
+/// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+/// let increment = ImuIncrement::new(&input, &g_w, 0.01, Discretisation::ZeroOrderHold);
+/// // The same motion as the step that is made of it.
+/// let start = SE23 { velocity: Vector3::new(5.0, 0.0, 0.0), ..SE23::identity() };
+/// let moved = increment.apply(&start);
+/// assert!(moved.between(&ImuStep::from(&increment).apply(&start)).log().norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuIncrement {
     /// Rate and force over the interval, biases removed.

@@ -12,6 +12,23 @@ use super::transition::Transition;
 use crate::lie::{LieGroup, SE23};
 
 /// A Lie group whose first nine tangent coordinates are those of SE_2(3).
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{InertialState, NavState};
+/// use nalgebra::Vector3;
+///
+/// /// Whatever the state carries beside the pose.
+/// fn speed_mps<G: InertialState<D>, const D: usize>(state: &G) -> f64 {
+///     state.pose().velocity.norm()
+/// }
+///
+/// let pose = SE23 { velocity: Vector3::new(3.0, 4.0, 0.0), ..SE23::identity() };
+/// let biased = NavState::from_parts(pose, Vector3::repeat(0.01), Vector3::zeros());
+/// assert_eq!((speed_mps(&pose), speed_mps(&biased)), (5.0, 5.0));
+/// // A state without biases has none.
+/// assert_eq!(pose.gyro_bias(), Vector3::zeros());
+/// ```
 pub trait InertialState<const D: usize>: LieGroup<D> {
     /// Attitude, velocity and position.
     fn pose(&self) -> &SE23;
@@ -81,6 +98,21 @@ pub trait InertialState<const D: usize>: LieGroup<D> {
     }
 
     /// The step that the raw sample `measured` makes from this state, its biases removed.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, InertialState, NavState};
+    /// use nalgebra::Vector3;
+    ///
+    /// // A gyroscope that shows nothing but its bias: the vehicle does not turn.
+    /// let bias = Vector3::new(0.0, 0.0, 0.02);
+    /// let state = NavState::from_parts(SE23::identity(), bias, Vector3::zeros());
+    /// let measured = ImuInput { omega_b: bias, force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let step = state.imu_step(&measured, &g_w, 1.0, Discretisation::ZeroOrderHold);
+    /// let (moved, _) = state.transition(&step);
+    /// assert!(moved.log()[2].abs() < 1e-15);
+    /// ```
     fn imu_step(
         &self,
         measured: &ImuInput,

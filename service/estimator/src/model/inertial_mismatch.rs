@@ -27,6 +27,16 @@ use crate::lie::SE23;
 /// A sensor whose scale is wrong, on every axis alike. All that can be declared of a state that carries biases
 /// ([`NavState`]): there the mean of a bias is what the state estimates, and declaring it unknown would take from the
 /// state every fix that it learns from.
+///
+/// ```
+/// use inekf::model::{ImuInput, InertialScale};
+/// use nalgebra::Vector3;
+///
+/// let input = ImuInput { omega_b: Vector3::new(0.0, 0.0, 0.5), force_b: Vector3::new(0.0, 0.0, 9.8) };
+/// // A hundred per cent more is as much again; the force stays.
+/// let more = InertialScale::Gyro.disturbance(&input);
+/// assert_eq!((more.omega_b, more.force_b), (input.omega_b, Vector3::zeros()));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InertialScale {
     /// The angular rate is `(1 + m) omega`.
@@ -37,6 +47,16 @@ pub enum InertialScale {
 
 /// What may be wrong with the IMU of a state without biases. Axes are unit vectors in body axes; one that is zero
 /// says nothing.
+///
+/// ```
+/// use inekf::model::{ImuInput, InertialMismatch};
+/// use nalgebra::Vector3;
+///
+/// let input = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.8) };
+/// let drag = InertialMismatch::AccelBias { axis_b: Vector3::x() };
+/// // In m/s^2 along the axis, whatever the sample.
+/// assert_eq!(drag.disturbance(&input).force_b, Vector3::x());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InertialMismatch {
     /// The angular rate is `omega + m axis_b`, m in rad/s.

@@ -25,6 +25,14 @@ use super::process::{MeanMismatch, Motion, Part, PathNoise};
 pub const MAX_PARAMETERS: usize = 3;
 
 /// Up to three columns of R rows: one for each parameter of a mismatch.
+///
+/// ```
+/// use inekf::model::Columns;
+/// use nalgebra::Vector2;
+///
+/// let columns = Columns::one(Vector2::new(1.0, 2.0));
+/// assert_eq!(columns.map(|column| column * 3.0).as_slice(), [Vector2::new(3.0, 6.0)]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Columns<const R: usize> {
     columns: [SVector<f64, R>; MAX_PARAMETERS],
@@ -63,6 +71,15 @@ impl<const R: usize> Columns<R> {
 }
 
 /// A mismatch with what is known of the size of its parameters.
+///
+/// ```
+/// use inekf::model::{Declared, ProcessMismatch};
+///
+/// // Nothing is known of it, or that it is of some 5 %.
+/// let hard = Declared::hard(ProcessMismatch::OdometryScale);
+/// let soft = Declared::soft(ProcessMismatch::OdometryScale, 0.05);
+/// assert!(hard.sigma.is_infinite() && soft.sigma == 0.05);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Declared<T> {
     /// The mismatch.
@@ -88,6 +105,18 @@ impl<T> Declared<T> {
 }
 
 /// Class 1: the odometry's increment is `kappa delta_kappa`, \[LC\] (12).
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{OdometryStep, ProcessMismatch};
+/// use nalgebra::Vector3;
+///
+/// // A gyro's bias turns more the longer the step is, a wheel's scale leads farther the longer its way.
+/// let step = OdometryStep::<SE2>::new(&Vector3::new(0.0, 10.0, 0.0), 2.0);
+/// let bias = ProcessMismatch::OdometryRotationBias { axis: 0 }.direction(&step);
+/// let scale = ProcessMismatch::OdometryScale.direction(&step);
+/// assert_eq!((bias, scale), (Vector3::new(2.0, 0.0, 0.0), Vector3::new(0.0, 10.0, 0.0)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProcessMismatch {
     /// The translation is `(1 + m) u`: slipping or deflated wheels. One parameter.
@@ -166,6 +195,26 @@ impl<G: RigidPose<D, N>, const D: usize, const N: usize> Motion<D, N> for Odomet
 }
 
 /// Classes 2 and 3: what is wrong with one of the position sources of a [`Points`].
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{OutputMismatch, PlanarFix, PointFix};
+/// use nalgebra::{Matrix2, Vector2};
+///
+/// let points = PlanarFix::new([PointFix {
+///     position_w: Vector2::zeros(),
+///     covariance_w: Matrix2::identity(),
+///     lever_arm_b: Vector2::zeros(),
+///     scale_error: 0.0,
+/// }]);
+/// let mut chi = SE2::identity();
+/// chi.position = Vector2::new(30.0, 0.0);
+/// // A scale leads along the position, a turn across it, both by as much as it is far.
+/// let scale = OutputMismatch::MeasurementScale { source: 0 }.columns(&points, &chi);
+/// let turn = OutputMismatch::MeasurementRotation { source: 0, axis_w: None }.columns(&points, &chi);
+/// assert_eq!(scale.as_slice()[0], Vector2::new(30.0, 0.0));
+/// assert!((turn.as_slice()[0] - Vector2::new(0.0, -30.0)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OutputMismatch {
     /// Class 2: the source sees `(1 + eps + m) x + R b`. One parameter.
@@ -192,6 +241,13 @@ impl OutputMismatch {
     }
 
     /// The same of another source.
+    ///
+    /// ```
+    /// use inekf::model::OutputMismatch;
+    ///
+    /// let scale = OutputMismatch::MeasurementScale { source: 0 };
+    /// assert_eq!(scale.at(3).source(), 3);
+    /// ```
     #[must_use]
     pub fn at(&self, source: usize) -> Self {
         match *self {
@@ -203,6 +259,14 @@ impl OutputMismatch {
     }
 
     /// How many parameters it has in N dimensions.
+    ///
+    /// ```
+    /// use inekf::model::OutputMismatch;
+    ///
+    /// // A turn about any axis has three in space and one in the plane.
+    /// let turn = OutputMismatch::MeasurementRotation { source: 0, axis_w: None };
+    /// assert_eq!((turn.parameters::<2>(), turn.parameters::<3>()), (1, 3));
+    /// ```
     pub fn parameters<const N: usize>(&self) -> usize {
         match self {
             Self::MeasurementRotation { axis_w: None, .. } if N == 3 => 3,

@@ -14,6 +14,21 @@ use super::transition::Transition;
 use crate::lie::{LieGroup, SE23, sek3};
 
 /// Pose and biases.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::NavState;
+/// use nalgebra::Vector3;
+///
+/// let state = NavState {
+///     pose: SE23::identity(),
+///     gyro_bias: Vector3::new(0.01, 0.0, 0.0),
+///     accel_bias: Vector3::new(0.0, 0.0, 0.05),
+/// };
+/// // Rotation, velocity, position, gyro bias, accelerometer bias.
+/// let xi = state.log();
+/// assert_eq!((xi[9], xi[14]), (0.01, 0.05));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NavState {
     /// Attitude `r_wb`, velocity `v_w` and position `p_w`.

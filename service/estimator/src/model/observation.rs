@@ -15,6 +15,19 @@ use crate::lie::{LieGroup, hat};
 pub mod points;
 
 /// A measurement of dimension M with additive noise.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{HeadingObservation, Observation};
+/// use nalgebra::SVector;
+///
+/// // H belongs to the left-invariant error: h(chi exp(xi)) = h(chi) + H xi, and z = y - h.
+/// let fix = HeadingObservation { heading: 0.2, sigma: 0.1 };
+/// let chi = SE23::exp(&SVector::repeat(0.2));
+/// let xi = SVector::<f64, 9>::from_fn(|i, _| 1e-6 * (i as f64 - 4.0));
+/// let change = fix.residual(&chi) - fix.residual(&chi.compose(&SE23::exp(&xi)));
+/// assert!((change - fix.left_jacobian(&chi) * xi).norm() < 1e-10);
+/// ```
 pub trait Observation<G: LieGroup<D>, const D: usize, const M: usize> {
     /// `y - h(chi)`, M.
     fn residual(&self, chi: &G) -> SVector<f64, M>;
@@ -71,6 +84,16 @@ impl<G: InertialState<D>, const D: usize> Observation<G, D, 3> for PositionObser
 }
 
 /// Velocity of the IMU over ground, world frame: `y = v_w + n`.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Observation, VelocityObservation};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// // In world axes: what a receiver's Doppler says, not what wheels say.
+/// let fix = VelocityObservation { velocity_w: Vector3::new(3.0, 0.0, 0.0), covariance_w: Matrix3::identity() };
+/// assert_eq!(fix.residual(&SE23::identity()), Vector3::new(3.0, 0.0, 0.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityObservation {
     /// Measured velocity, m/s, world frame.
@@ -97,6 +120,17 @@ impl<G: InertialState<D>, const D: usize> Observation<G, D, 3> for VelocityObser
 }
 
 /// Heading of the body's x axis, counter-clockwise from east: `y = atan2(R10, R00) + n`.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23, SO3};
+/// use inekf::model::{HeadingObservation, Observation};
+///
+/// // 179 degrees against -179: two degrees apart, not 358.
+/// let rotation = SO3::from_roll_pitch_heading(0.0, 0.0, -179_f64.to_radians());
+/// let fix = HeadingObservation { heading: 179_f64.to_radians(), sigma: 0.1 };
+/// let residual = fix.residual(&SE23 { rotation, ..SE23::identity() });
+/// assert!((residual.x.to_degrees() + 2.0).abs() < 1e-9);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeadingObservation {
     /// Measured heading, rad.

@@ -43,6 +43,17 @@ impl<G> OdometryStep<G> {
     }
 
     /// `chi kappa`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// // In the body's frame: facing north, forwards is north.
+    /// let north = SE2::exp(&Vector3::new(90_f64.to_radians(), 0.0, 0.0));
+    /// let ahead = OdometryStep::new(&Vector3::new(0.0, 2.0, 0.0), 0.1);
+    /// assert!((ahead.apply(&north).position - Vector2::new(0.0, 2.0)).norm() < 1e-12);
+    /// ```
     pub fn apply<const D: usize>(&self, chi: &G) -> G
     where
         G: LieGroup<D>,
@@ -51,6 +62,17 @@ impl<G> OdometryStep<G> {
     }
 
     /// F, D x D, of the left-invariant error: `Ad_{kappa^-1}`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use nalgebra::Vector3;
+    ///
+    /// // Ten metres ahead a heading that is off by 0.01 rad is 0.1 m to the side.
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
+    /// let error = ahead.left_jacobian() * Vector3::new(0.01, 0.0, 0.0);
+    /// assert!((error - Vector3::new(0.01, 0.0, 0.1)).norm() < 1e-12);
+    /// ```
     pub fn left_jacobian<const D: usize>(&self) -> SMatrix<f64, D, D>
     where
         G: LieGroup<D>,
@@ -60,6 +82,15 @@ impl<G> OdometryStep<G> {
 
     /// `(0, Omega^T u)`, D: how the left-invariant error grows with a relative error of the translation, m
     /// (\[LC\] (29)).
+    ///
+    /// ```
+    /// use inekf::lie::SE2;
+    /// use inekf::model::OdometryStep;
+    /// use nalgebra::Vector3;
+    ///
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
+    /// assert_eq!(ahead.scale_direction(), Vector3::new(0.0, 10.0, 0.0));
+    /// ```
     pub fn scale_direction<const D: usize, const N: usize>(&self) -> SVector<f64, D>
     where
         G: RigidPose<D, N>,
@@ -73,6 +104,15 @@ impl<G> OdometryStep<G> {
     }
 
     /// `(log Omega, 0)`, D: how the left-invariant error grows with a relative error of the rotation, rad.
+    ///
+    /// ```
+    /// use inekf::lie::SE2;
+    /// use inekf::model::OdometryStep;
+    /// use nalgebra::Vector3;
+    ///
+    /// let turn = OdometryStep::<SE2>::new(&Vector3::new(0.3, 10.0, 0.0), 1.0);
+    /// assert!((turn.turn_direction() - Vector3::new(0.3, 0.0, 0.0)).norm() < 1e-15);
+    /// ```
     pub fn turn_direction<const D: usize, const N: usize>(&self) -> SVector<f64, D>
     where
         G: RigidPose<D, N>,

@@ -10,6 +10,17 @@ use super::nav_state::NavState;
 use crate::lie::{LieGroup, SE2, SE3, SE23, SO2, SO3, hat};
 
 /// A Lie group of dimension D whose element places a body in N dimensions.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::Pose;
+/// use nalgebra::{Vector2, Vector3};
+///
+/// // A point half a metre to the left of a vehicle that faces north lies to the west.
+/// let north = SE2::exp(&Vector3::new(90_f64.to_radians(), 0.0, 0.0));
+/// let left = north.point_w(&Vector2::new(0.0, 0.5), 1.0);
+/// assert!((left - Vector2::new(-0.5, 0.0)).norm() < 1e-12);
+/// ```
 pub trait Pose<const D: usize, const N: usize>: LieGroup<D> {
     /// Where the position begins in the tangent vector.
     const POSITION: usize;
@@ -44,6 +55,16 @@ pub trait Pose<const D: usize, const N: usize>: LieGroup<D> {
 }
 
 /// A pose that odometry drives: a rotation, a position and nothing else.
+///
+/// ```
+/// use inekf::lie::SE2;
+/// use inekf::model::{Pose, RigidPose};
+/// use nalgebra::{Vector2, Vector3};
+///
+/// // The translation is taken literally: it is not bent by the turn, as `exp` would.
+/// let kappa = SE2::from_increment(&Vector3::new(1.0, 2.0, 0.0));
+/// assert_eq!(kappa.position_w(), Vector2::new(2.0, 0.0));
+/// ```
 pub trait RigidPose<const D: usize, const N: usize>: Pose<D, N> {
     /// `(Exp(phi), u)` of the increment `(phi, u)`: rotation vector in radians, translation in metres, in the
     /// body frame at the start of the step. The translation is taken literally, which `exp` would not.

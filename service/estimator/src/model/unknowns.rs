@@ -25,6 +25,17 @@ use crate::lie::{LieGroup, SO2, SO3};
 pub const MAX_OUTPUT_MISMATCHES: usize = 8;
 
 /// What the parameters of an [`Augmented`] state mean.
+///
+/// ```
+/// use inekf::model::{OutputMismatch, ProcessMismatch, Unknowns};
+///
+/// let scale = OutputMismatch::MeasurementScale { source: 0 };
+/// let unknowns = Unknowns::new::<2, 2>(&[ProcessMismatch::OdometryScale], &[scale]).expect("two of two");
+/// // Those of the motion first.
+/// assert!(unknowns.is_of_motion(0) && !unknowns.is_of_motion(1));
+/// // Three do not fit into two.
+/// assert!(Unknowns::new::<2, 2>(&[ProcessMismatch::OdometryScale], &[scale, scale.at(1)]).is_none());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unknowns {
     process: [Option<ProcessMismatch>; MAX_PROCESS_MISMATCHES],
@@ -32,6 +43,20 @@ pub struct Unknowns {
 }
 
 /// The transition of an augmented state over one step.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{Augmented, OdometryStep, ProcessMismatch, Unknowns};
+/// use nalgebra::{Vector1, Vector3};
+///
+/// let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+/// let state = Augmented::<SE2, 3, 1, 4>::new(SE2::identity(), Vector1::new(0.1));
+/// let seen = OdometryStep::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
+/// let actual = unknowns.step(&seen, &state);
+/// // A tenth longer than it was seen; a scale that is off by more would lead farther by the way.
+/// assert!((actual.step.kappa.position.x - 11.0).abs() < 1e-12);
+/// assert!((actual.left_jacobian[(1, 3)] - 10.0).abs() < 1e-9);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AugmentedStep<G, const D: usize> {
     /// The step, with the estimated parameters in it.

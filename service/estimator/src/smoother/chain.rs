@@ -15,6 +15,20 @@ use crate::lie::{LieGroup, SE23};
 use crate::model::{Automorphism, GroupAffineStep, ImuStep, OdometryStep};
 
 /// A motion from one state to the next.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use inekf::smoother::Motion;
+/// use nalgebra::Vector3;
+///
+/// let step = OdometryStep::<SE2>::new(&Vector3::new(0.1, 1.0, 0.0), 1.0);
+/// let (chi, xi) = (SE2::exp(&Vector3::new(0.5, 3.0, 1.0)), Vector3::new(0.2, -0.1, 0.3));
+/// // f(chi exp(xi)) = f(chi) exp(F xi), for an error of any size.
+/// let moved = Motion::apply(&step, &chi.compose(&SE2::exp(&xi)));
+/// let f = Motion::left_jacobian(&step, &chi);
+/// assert!((Motion::apply(&step, &chi).between(&moved).log() - f * xi).norm() < 1e-12);
+/// ```
 pub trait Motion<G: LieGroup<D>, const D: usize> {
     /// `f(chi)`.
     fn apply(&self, chi: &G) -> G;
@@ -77,6 +91,22 @@ pub struct Sighting<O> {
 /// A chain that grows at its end.
 ///
 /// G is the group, P the side of the prior's error, T the motion, O the observation.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{OdometryStep, PlanarFix};
+/// use inekf::smoother::Chain;
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// let p = Covariance::from_variances(&Vector3::repeat(1.0));
+/// let mut chain: Chain<SE2, Left, OdometryStep<SE2>, PlanarFix, 3> =
+///     Chain::with_capacity(Belief::new(SE2::identity(), p), 3, 0);
+/// chain.advance(OdometryStep::new(&Vector3::new(0.0, 1.0, 0.0), 1.0), Matrix3::identity());
+/// chain.advance(OdometryStep::new(&Vector3::new(0.1, 1.0, 0.0), 1.0), Matrix3::identity());
+/// // A state more than there are motions.
+/// assert_eq!((chain.links().len(), chain.states()), (2, 3));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Chain<G, P, T, O, const D: usize> {
     prior: Belief<G, P, D>,

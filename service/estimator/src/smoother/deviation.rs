@@ -6,6 +6,15 @@ use nalgebra::{SMatrix, SVector};
 const SINGULAR: f64 = 1e-12;
 
 /// A residual, measured by a covariance.
+///
+/// ```
+/// use inekf::smoother::{Deviation, deviation};
+/// use nalgebra::{Matrix2, Vector2};
+///
+/// // Two standard deviations where there is a variance, and a residual where there is none.
+/// let off = deviation(&Vector2::new(6.0, 0.5), &Matrix2::new(9.0, 0.0, 0.0, 0.0));
+/// assert_eq!(off, Deviation { square: 4.0, outside: 0.5 });
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// `r^T C^+ r` in the directions that C spreads into.
@@ -18,6 +27,16 @@ pub struct Deviation {
 ///
 /// A Cholesky factorisation with pivoting of the correlations, so that units do not matter; the residual is
 /// reduced along with it, and what is left where no variance is left lies outside.
+///
+/// ```
+/// use inekf::smoother::deviation;
+/// use nalgebra::{Matrix2, Vector2};
+///
+/// // Fully correlated: together is allowed, apart is not.
+/// let together = Matrix2::new(1.0, 1.0, 1.0, 1.0);
+/// assert!(deviation(&Vector2::new(1.0, 1.0), &together).outside < 1e-12);
+/// assert!(deviation(&Vector2::new(1.0, -1.0), &together).outside > 0.5);
+/// ```
 pub fn deviation<const D: usize>(
     residual: &SVector<f64, D>,
     covariance: &SMatrix<f64, D, D>,

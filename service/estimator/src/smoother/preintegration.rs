@@ -25,6 +25,31 @@ use crate::model::{
 use crate::smoother::Motion;
 
 /// The motion of a body over any number of IMU intervals.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Discretisation, ImuInput, ImuNoise, InertialState};
+/// use inekf::smoother::Preintegration;
+/// use nalgebra::Vector3;
+///
+/// let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+/// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+/// let start = SE23 { velocity: Vector3::new(5.0, 0.0, 0.0), ..SE23::identity() };
+/// let (mut whole, mut step_by_step) = (Preintegration::new(&start), start);
+/// for i in 0..50 {
+///     let sample = ImuInput {
+///         omega_b: Vector3::new(0.0, 0.1, 0.01 * f64::from(i)),
+///         force_b: Vector3::new(0.5, 0.0, 9.8),
+///     };
+///     whole.push(&sample, &g_w, 0.01, Discretisation::ZeroOrderHold, &noise);
+///     let step = step_by_step.imu_step(&sample, &g_w, 0.01, Discretisation::ZeroOrderHold);
+///     step_by_step = step.apply(&step_by_step);
+/// }
+/// // Fifty samples as one motion, from any state.
+/// assert!((whole.dt_s() - 0.5).abs() < 1e-12);
+/// let (moved, _) = whole.transition(&start);
+/// assert!(moved.between(&step_by_step).log().norm() < 1e-10);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Preintegration<G, const D: usize> {
     /// A state with the biases that were removed; its pose is without meaning.

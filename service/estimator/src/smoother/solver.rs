@@ -58,6 +58,20 @@ pub struct LinearMeasurement<const D: usize, const M: usize> {
 }
 
 /// Why a chain could not be solved.
+///
+/// ```
+/// use inekf::smoother::{LinearMeasurement, SmootherError, Solver};
+/// use nalgebra::{Matrix1, Vector1};
+///
+/// let mut solver = Solver::<1, 1>::with_capacity(1, 1);
+/// let broken = LinearMeasurement {
+///     value: Vector1::new(1.0),
+///     jacobian: Matrix1::new(1.0),
+///     noise: Matrix1::new(-1.0),
+/// };
+/// let refused = solver.measure(&broken);
+/// assert_eq!(refused, Err(SmootherError::InnovationNotPositiveDefinite { state: 0 }));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SmootherError {
     /// An innovation covariance is not positive definite.
@@ -98,6 +112,18 @@ impl fmt::Display for SmootherError {
 impl core::error::Error for SmootherError {}
 
 /// The gain of one measurement, and what the way back needs of it. It depends on covariances alone.
+///
+/// ```
+/// use inekf::filter::Covariance;
+/// use inekf::smoother::Gain;
+/// use nalgebra::{Matrix1, RowVector2, Vector2};
+///
+/// let p = Covariance::from_variances(&Vector2::new(3.0, 1.0));
+/// let (gain, after) = Gain::new(&p, &RowVector2::new(1.0, 0.0), &Matrix1::new(1.0)).expect("definite");
+/// // P / (P + N) of what it sees, nothing of what it does not.
+/// assert!((gain.gain - Vector2::new(0.75, 0.0)).norm() < 1e-15);
+/// assert!((after.matrix()[(0, 0)] - 0.75).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Gain<const D: usize, const M: usize> {
     /// H, M x D.
@@ -164,6 +190,35 @@ struct Passed<const D: usize> {
 /// A chain that grows at its end, filtered as it grows and smoothed on request.
 ///
 /// D is the dimension of an unknown, M that of a measurement.
+///
+/// ```
+/// use inekf::filter::Covariance;
+/// use inekf::smoother::{Gaussian, LinearMeasurement, LinearMotion, Solver};
+/// use nalgebra::{Matrix1, Vector1};
+///
+/// let mut solver = Solver::<1, 1>::with_capacity(2, 2);
+/// solver.start(&Gaussian {
+///     mean: Vector1::new(0.0),
+///     covariance: Covariance::from_variances(&Vector1::new(1.0)),
+/// });
+/// // It stays what it is, exactly; and then it is measured, as well as it was known.
+/// let stays = LinearMotion {
+///     transition: Matrix1::new(1.0),
+///     offset: Vector1::new(0.0),
+///     noise: Matrix1::new(0.0),
+/// };
+/// solver.advance(&stays);
+/// let measured = LinearMeasurement {
+///     value: Vector1::new(1.0),
+///     jacobian: Matrix1::new(1.0),
+///     noise: Matrix1::new(1.0),
+/// };
+/// solver.measure(&measured)?;
+/// assert!((solver.newest().covariance.matrix()[(0, 0)] - 0.5).abs() < 1e-15);
+/// // What came later tells of what was before.
+/// assert!(solver.solve().iter().all(|xi| (xi[0] - 0.5).abs() < 1e-15));
+/// # Ok::<(), inekf::smoother::SmootherError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solver<const D: usize, const M: usize> {
     prior: Gaussian<D>,

@@ -48,6 +48,15 @@ pub use fix::Fix;
 pub use prior::PriorForm;
 
 /// How a window is kept.
+///
+/// ```
+/// use inekf::smoother::{Jacobians, PriorForm, WindowOptions};
+///
+/// // What is fast: one iteration, covariances that do not depend on the estimate.
+/// let options = WindowOptions::new(10);
+/// assert_eq!((options.capacity, options.iterations), (10, 1));
+/// assert_eq!((options.jacobians, options.prior), (Jacobians::Frozen, PriorForm::GroupMean));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowOptions {
     /// W, the most states that the window holds; at least 1.
@@ -79,6 +88,23 @@ impl WindowOptions {
 }
 
 /// What an update did.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left, Verdict};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::VelocityObservation;
+/// use inekf::smoother::{Window, WindowOptions};
+/// use nalgebra::{Matrix3, SVector, Vector3};
+///
+/// let first =
+///     Belief::new(SE23::identity(), Covariance::from_variances(&SVector::<f64, 9>::repeat(1.0)));
+/// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions { gate: 16.0, ..WindowOptions::new(5) });
+/// // 50 m/s where 1 m/s was sure: refused, and said by how much.
+/// let wrong = VelocityObservation { velocity_w: Vector3::new(50.0, 0.0, 0.0), covariance_w: Matrix3::identity() };
+/// let correction = window.update(wrong)?;
+/// assert!(correction.verdict == Verdict::Gated && (correction.nis - 1250.0).abs() < 1e-6);
+/// # Ok::<(), inekf::smoother::WindowError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowCorrection {
     /// Whether the fix was used.
@@ -91,6 +117,22 @@ pub struct WindowCorrection {
 }
 
 /// Why an update could not be done; the window is unchanged.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::HeadingObservation;
+/// use inekf::smoother::{Window, WindowError, WindowOptions};
+/// use nalgebra::SVector;
+///
+/// let first =
+///     Belief::new(SE23::identity(), Covariance::from_variances(&SVector::<f64, 9>::repeat(1.0)));
+/// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(5));
+/// let fix = HeadingObservation { heading: 0.1, sigma: 0.1 };
+/// assert!(window.update(fix).is_ok());
+/// // One fix a state.
+/// assert_eq!(window.update(fix), Err(WindowError::AlreadySeen));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WindowError {
     /// The newest state has been seen already.

@@ -9,6 +9,21 @@ use crate::model::Unknowns;
 
 /// A hypothesis on how P mismatches behave. All sigmas are in the units of the mismatches, in the order of
 /// [`Unknowns`].
+///
+/// ```
+/// use inekf::filter::Mode;
+/// use nalgebra::Vector1;
+///
+/// // A scale that drifts by 1 % in the root of a second, beginning anywhere within 5 %.
+/// let drifting = Mode {
+///     entry_sigma: Vector1::new(0.05),
+///     walk_sigma: Vector1::new(0.01),
+///     white_sigma: Vector1::new(0.0),
+///     white_interval_s: 0.1,
+/// };
+/// // After nine seconds it has gone by 3 %.
+/// assert!((drifting.walk_sigma[0] * 9_f64.sqrt() - 0.03).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode<const P: usize> {
     /// Standard deviation of the mismatches when the mode is entered; zero where they are absent.
@@ -63,6 +78,16 @@ impl<const P: usize> Mode<P> {
 }
 
 /// How modes follow each other: a continuous-time Markov chain over S modes.
+///
+/// ```
+/// use inekf::filter::Switching;
+///
+/// // Bursts that begin every 5 s and last 2 s.
+/// let bursts = Switching { initial: [1.0, 0.0], rates_hz: [[0.0, 0.2], [0.5, 0.0]] };
+/// // In the long run they are there for two sevenths of the time: what goes in comes out.
+/// let share = 2.0 / 7.0;
+/// assert!(((1.0 - share) * bursts.rates_hz[0][1] - share * bursts.rates_hz[1][0]).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Switching<const S: usize> {
     /// Weights at the start; they add up to one.
@@ -90,6 +115,18 @@ impl<const S: usize> Switching<S> {
 }
 
 /// What is expected of one mismatch.
+///
+/// ```
+/// use inekf::filter::{Expected, STANDARD_MODES, standard_modes};
+///
+/// // A wheel that is off by 3 %, and slips by 20 % at times.
+/// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+/// let (modes, switching) = standard_modes(&[wheel], 0.1);
+/// assert_eq!(modes.len(), STANDARD_MODES);
+/// assert!((switching.initial.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+/// // In the first it is absent.
+/// assert_eq!(modes[0].entry_sigma[0], 0.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
     /// How large it is when it lasts, 1 sigma.
@@ -135,6 +172,16 @@ pub const STANDARD_MODES: usize = 9;
 ///
 /// Regimes follow each other once in a quarter of an hour; bursts begin every 5 s and last 2 s; what is
 /// constant jumps or begins to drift every 100 s. `white_interval_s` is that of [`Mode`].
+///
+/// ```
+/// use inekf::filter::{Expected, standard_modes};
+///
+/// let source = Expected { sigma: 0.05, burst_sigma: 0.3, of_motion: false };
+/// let (modes, _) = standard_modes(&[source], 0.1);
+/// // Mode 3 is noise on the motion only: a source has none of it. Mode 8 is noise of measurements.
+/// assert_eq!(modes[3].white_sigma[0], 0.0);
+/// assert!(modes[8].white_sigma[0] > 0.0);
+/// ```
 pub fn standard_modes<const P: usize>(
     expected: &[Expected; P],
     white_interval_s: f64,

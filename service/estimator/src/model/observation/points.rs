@@ -9,6 +9,23 @@ use super::Observation;
 use crate::model::pose::Pose;
 
 /// What one source says of one point of the body, N = 2 or 3 dimensions.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::PointFix;
+/// use nalgebra::{Matrix2, Vector2};
+///
+/// let fix = PointFix {
+///     position_w: Vector2::new(21.0, 0.5),
+///     covariance_w: Matrix2::identity(),
+///     lever_arm_b: Vector2::new(0.0, 0.5), // half a metre to the left
+///     scale_error: 0.1,
+/// };
+/// let mut chi = SE2::identity();
+/// chi.position.x = 20.0;
+/// // (1 + eps) x + R b.
+/// assert!((fix.expected_w(&chi) - Vector2::new(22.0, 0.5)).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointFix<const N: usize> {
     /// Measured position, m, world frame.
@@ -29,6 +46,23 @@ impl<const N: usize> PointFix<N> {
 }
 
 /// K fixes of N dimensions, taken together as one observation of `M = K N`. Their noises are independent.
+///
+/// ```
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{Observation, PlanarPair, PointFix};
+/// use nalgebra::{Matrix2, Vector2};
+///
+/// let fix = |x_m, variance| PointFix {
+///     position_w: Vector2::new(x_m, 0.0),
+///     covariance_w: Matrix2::identity() * variance,
+///     lever_arm_b: Vector2::zeros(),
+///     scale_error: 0.0,
+/// };
+/// // Two sources at one time, one observation of four dimensions.
+/// let pair = PlanarPair::new([fix(1.0, 1.0), fix(2.0, 4.0)]);
+/// assert_eq!(pair.residual(&SE2::identity()).as_slice(), [1.0, 0.0, 2.0, 0.0]);
+/// assert_eq!(pair.noise_covariance().diagonal().as_slice(), [1.0, 1.0, 4.0, 4.0]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Points<const K: usize, const N: usize, const M: usize> {
     /// The fixes, in the order in which the observation stacks them.

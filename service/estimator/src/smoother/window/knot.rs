@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use super::Fix;
 use super::fix::HeadingRow;
 use super::track::{InputJacobian, Track};
-use crate::filter::{Covariance, Seen, Side};
+use crate::filter::{Covariance, Factor, Seen, Side, is_mild};
 use crate::model::InertialState;
 use crate::smoother::linearise;
 use crate::smoother::{Jacobians, Link, Preintegration};
@@ -133,20 +133,27 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         };
         let noise = fix.covariance_b(&self.chi);
         let row = fix.heading_row(&self.chi);
-        let h = fix.jacobian(&row);
         let p_ht = fix.covariance_with(&self.filtered, &row);
         let mut innovation = noise;
         for axis in 0..3 {
             let seen = fix.seen(&p_ht.column(axis).into_owned(), &row);
             innovation += seen * Vector3::ith(axis, 1.0).transpose();
         }
-        let Some(weight) = inverse(&innovation) else {
+        let Some(factor) = Factor::new(&innovation) else {
             return false;
         };
+        let weight = factor.inverse();
         let gain = p_ht * weight;
-        self.filtered = self
-            .filtered
-            .corrected_with(&p_ht, &gain, &Seen::by(&h), &h, &noise);
+        // As the filter does it.
+        if is_mild(&noise, &innovation) {
+            let decorrelated = factor.decorrelated_rows(&p_ht);
+            self.filtered.reduce(&decorrelated, factor.reciprocals());
+        } else {
+            let h = fix.jacobian(&row);
+            self.filtered = self
+                .filtered
+                .corrected_with(&p_ht, &gain, &Seen::by(&h), &h, &noise);
+        }
         self.gain = Some(FixGain { gain, weight, row });
         true
     }
@@ -185,30 +192,4 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
             _ => *end,
         }
     }
-}
-
-/// The inverse of a symmetric matrix by its Cholesky factor; `None` if it is not positive definite.
-fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    // The factor's rows, their diagonal inverted.
-    let root = |square: f64| (square > 0.0).then(|| 1.0 / square.sqrt());
-    let d0 = root(s[(0, 0)])?;
-    let (l10, l20) = (s[(1, 0)] * d0, s[(2, 0)] * d0);
-    let d1 = root(s[(1, 1)] - l10 * l10)?;
-    let l21 = (s[(2, 1)] - l20 * l10) * d1;
-    let d2 = root(s[(2, 2)] - l20 * l20 - l21 * l21)?;
-    // The inverse of the factor, of which the inverse is the square.
-    let (i10, i21) = (-l10 * d0 * d1, -l21 * d1 * d2);
-    let i20 = -(l20 * d0 + l21 * i10) * d2;
-    let (m01, m02, m12) = (i10 * d1 + i20 * i21, i20 * d2, i21 * d2);
-    Some(Matrix3::new(
-        d0 * d0 + i10 * i10 + i20 * i20,
-        m01,
-        m02,
-        m01,
-        d1 * d1 + i21 * i21,
-        m12,
-        m02,
-        m12,
-        d2 * d2,
-    ))
 }

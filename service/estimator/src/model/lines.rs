@@ -174,12 +174,10 @@ impl Lines {
         p: &mut [[f64; D]; D],
     ) {
         self.put_columns_of_sum::<D, Q, 1>(t, q, 0, p);
-        for column in [2, 4] {
-            self.put_columns_of_sum::<D, Q, 2>(t, q, column, p);
-        }
-        for column in [6, 7] {
-            self.put_columns_of_sum::<D, Q, 3>(t, q, column, p);
-        }
+        self.put_columns_of_sum::<D, Q, 2>(t, q, 2, p);
+        self.put_columns_of_sum::<D, Q, 2>(t, q, 4, p);
+        self.put_columns_of_sum::<D, Q, 3>(t, q, 6, p);
+        self.put_columns_of_sum::<D, Q, 3>(t, q, 7, p);
     }
 
     /// Two columns of it, which end in the first BLOCKS blocks.

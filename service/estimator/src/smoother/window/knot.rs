@@ -2,11 +2,12 @@
 //!
 //! All in left-invariant coordinates at the estimate of the last solve.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, SMatrix, SVector, Vector3};
 
 use super::Fix;
 use super::fix::HeadingRow;
 use super::track::{InputJacobian, Track};
+use crate::columns::combined;
 use crate::filter::{Covariance, Factor, Seen, Side, is_mild};
 use crate::model::InertialState;
 use crate::smoother::linearise;
@@ -105,6 +106,14 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         }
     }
 
+    /// The same in place of an older one.
+    pub fn begin(&mut self, chi: G, track: Track, predicted: &Covariance<D>) {
+        (self.chi, self.before) = (chi, chi);
+        self.track = track;
+        (self.fix, self.gain) = (None, None);
+        self.filtered = *predicted;
+    }
+
     /// Takes the fix back.
     pub fn unsee(&mut self, passage: &Passage<G, D>) {
         self.fix = None;
@@ -159,18 +168,21 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     }
 
     /// The filtered correction from the `predicted` one.
-    pub fn correct(&mut self, predicted: SVector<f64, D>) {
-        self.correction = predicted;
-        if let (Some(fix), Some(gain)) = (&self.fix, &self.gain) {
-            self.innovation = fix.residual_b(&self.chi) - fix.seen(&predicted, &gain.row);
-            self.weighted = gain.weight * self.innovation;
-            self.correction += gain.gain * self.innovation;
-        }
+    #[inline]
+    pub fn correct(&mut self, predicted: &SVector<f64, D>) {
+        let (Some(fix), Some(gain)) = (&self.fix, &self.gain) else {
+            self.correction = *predicted;
+            return;
+        };
+        self.innovation = fix.residual_b(&self.chi) - fix.seen(predicted, &gain.row);
+        self.weighted = gain.weight * self.innovation;
+        self.correction = plus_product(predicted, &gain.gain, &self.innovation);
     }
 
     /// The smoothed correction, from the adjoint at the end of this state; gives the adjoint at its beginning.
+    #[inline]
     pub fn smooth(&mut self, adjoint: SVector<f64, D>) -> SVector<f64, D> {
-        self.correction += self.filtered.matrix() * adjoint;
+        self.correction = plus_product(&self.correction, self.filtered.matrix(), &adjoint);
         match (&self.fix, &self.gain) {
             (Some(fix), Some(gain)) => {
                 let weight = self.weighted - gain.gain.tr_mul(&adjoint);
@@ -192,4 +204,16 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
             _ => *end,
         }
     }
+}
+
+/// `sum + M x`.
+#[inline]
+fn plus_product<const D: usize, const N: usize>(
+    sum: &SVector<f64, D>,
+    m: &SMatrix<f64, D, N>,
+    x: &SVector<f64, N>,
+) -> SVector<f64, D> {
+    let ([sum], [x]) = (&sum.data.0, x.data.0);
+    let column = combined::<D, D, D, D, N>(sum, x, m.data.0.each_ref());
+    SVector::from_array_storage(ArrayStorage([column]))
 }

@@ -42,15 +42,20 @@ pub(super) struct Prior<G, const D: usize> {
 }
 
 impl<G: LieGroup<D>, const D: usize> Prior<G, D> {
-    /// The prior of this form from a correction of `chi_lin` in left-invariant coordinates.
-    pub(super) fn new<S: Side>(form: PriorForm, chi_lin: &G, left: &Gaussian<D>) -> Self {
+    /// The prior of this form from a correction of `chi_lin`, of this mean and covariance in left-invariant coordinates.
+    pub(super) fn new<S: Side>(
+        form: PriorForm,
+        chi_lin: &G,
+        left_mean: &SVector<f64, D>,
+        left_covariance: &Covariance<D>,
+    ) -> Self {
         let (mean, covariance) = if S::IS_LEFT {
-            (left.mean, left.covariance)
+            (*left_mean, *left_covariance)
         } else {
             let from_left = S::from_left(chi_lin);
             (
-                from_left * left.mean,
-                left.covariance.transformed(&from_left),
+                from_left * left_mean,
+                left_covariance.transformed(&from_left),
             )
         };
         let on_group = || S::retract(chi_lin, &mean);

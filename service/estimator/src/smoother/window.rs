@@ -24,7 +24,7 @@
 use core::fmt;
 use core::marker::PhantomData;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 
 use crate::filter::{Belief, Covariance, Left, Side, Verdict};
 use crate::model::InertialState;
@@ -228,13 +228,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     }
 
     fn first_prior(first: &Belief<G, Left, D>, options: &WindowOptions) -> Prior<G, D> {
-        let at_its_mean = SVector::zeros();
-        Prior::new::<S>(
-            options.first_prior,
-            &first.mean,
-            &at_its_mean,
-            &first.covariance,
-        )
+        Prior::new::<S>(options.first_prior, &first.mean, &first.covariance)
     }
 
     /// Adds the state at the end of `motion`. If the window is full its oldest state leaves first, and its last
@@ -310,7 +304,9 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             passage.predicted = predicted;
             passage.transition * first.correction + offset
         };
-        self.prior = Prior::new::<S>(self.options.prior, &next.chi, &mean, &passage.predicted);
+        let form = self.options.prior;
+        self.prior
+            .replace::<S>(form, &next.chi, &mean, &passage.predicted);
     }
 
     /// Whether the Jacobians of the motions' residuals are left out: then the tracks have F.

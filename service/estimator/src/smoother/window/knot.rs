@@ -75,6 +75,8 @@ pub(super) struct Knot<G, const D: usize> {
     pub chi: G,
     /// The estimate before the update that is under way.
     pub before: G,
+    /// Whether the estimate is where the motion leads from the state before: so it is until an update moves both.
+    pub is_predicted: bool,
     /// The motion from the state before, where its Jacobian is frozen.
     pub track: Track,
     pub fix: Option<Fix>,
@@ -96,6 +98,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         Self {
             chi,
             before: chi,
+            is_predicted: true,
             track,
             fix: None,
             filtered: *predicted,
@@ -108,7 +111,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
 
     /// The same in place of an older one.
     pub fn begin(&mut self, chi: G, track: Track, predicted: &Covariance<D>) {
-        (self.chi, self.before) = (chi, chi);
+        (self.chi, self.before, self.is_predicted) = (chi, chi, true);
         self.track = track;
         (self.fix, self.gain) = (None, None);
         self.filtered = *predicted;
@@ -124,6 +127,9 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     /// The offset of the motion from `before`, `xi = F xi_before + offset + w`, with frozen Jacobians:
     /// minus `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
     pub fn offset<S: Side>(&self, before: &G) -> SVector<f64, D> {
+        if self.is_predicted {
+            return SVector::zeros();
+        }
         let expected = self.track.apply(before);
         let residual = S::Residual::difference(&expected, &self.chi);
         if S::Residual::IS_LEFT {
@@ -152,7 +158,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
             return false;
         };
         let weight = factor.inverse();
-        let gain = p_ht * weight;
+        let gain = times(&p_ht, &weight);
         // As the filter does it.
         if is_mild(&noise, &innovation) {
             let decorrelated = factor.decorrelated_rows(&p_ht);
@@ -216,4 +222,14 @@ fn plus_product<const D: usize, const N: usize>(
     let ([sum], [x]) = (&sum.data.0, x.data.0);
     let column = combined::<D, D, D, D, N>(sum, x, m.data.0.each_ref());
     SVector::from_array_storage(ArrayStorage([column]))
+}
+
+/// `A S`.
+#[inline]
+fn times<const D: usize>(a: &SMatrix<f64, D, 3>, s: &Matrix3<f64>) -> SMatrix<f64, D, 3> {
+    let columns = s
+        .data
+        .0
+        .map(|factors| combined::<D, D, D, D, 3>(&[0.0; D], factors, a.data.0.each_ref()));
+    SMatrix::from_array_storage(ArrayStorage(columns))
 }

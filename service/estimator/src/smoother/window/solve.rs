@@ -389,4 +389,5 @@ fn step<G: InertialState<D>, S: Side, const D: usize>(knot: &mut Knot<G, D>) {
         S::from_left(&knot.chi) * knot.correction
     };
     knot.chi = S::retract(&knot.chi, &xi);
+    knot.is_predicted = false;
 }

@@ -126,6 +126,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
 
     /// The offset of the motion from `before`, `xi = F xi_before + offset + w`, with frozen Jacobians:
     /// minus `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
+    #[inline]
     pub fn offset<S: Side>(&self, before: &G) -> SVector<f64, D> {
         if self.is_predicted {
             return SVector::zeros();
@@ -185,10 +186,13 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         self.correction = plus_product(predicted, &gain.gain, &self.innovation);
     }
 
-    /// The smoothed correction, from the adjoint at the end of this state; gives the adjoint at its beginning.
+    /// The smoothed correction, from the adjoint at the end of this state, zero if it is the newest; gives the adjoint at
+    /// its beginning.
     #[inline]
-    pub fn smooth(&mut self, adjoint: SVector<f64, D>) -> SVector<f64, D> {
-        self.correction = plus_product(&self.correction, self.filtered.matrix(), &adjoint);
+    pub fn smooth(&mut self, adjoint: SVector<f64, D>, is_newest: bool) -> SVector<f64, D> {
+        if !is_newest {
+            self.correction = plus_product(&self.correction, self.filtered.matrix(), &adjoint);
+        }
         match (&self.fix, &self.gain) {
             (Some(fix), Some(gain)) => {
                 let weight = self.weighted - gain.gain.tr_mul(&adjoint);

@@ -43,7 +43,11 @@ pub(super) struct Prior<G, const D: usize> {
 
 impl<G: LieGroup<D>, const D: usize> Prior<G, D> {
     /// The prior of this form that wants `first` as it is.
-    pub(super) fn new<S: Side>(form: PriorForm, first: &G, left_covariance: &Covariance<D>) -> Self {
+    pub(super) fn new<S: Side>(
+        form: PriorForm,
+        first: &G,
+        left_covariance: &Covariance<D>,
+    ) -> Self {
         let mut prior = Self {
             form,
             anchor: *first,

@@ -358,6 +358,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     ) -> bool {
         let tracked = self.is_tracked();
         let cost = self.work_back();
+        let last = self.knots.len() - 1;
         while *end > 0 {
             if *budget <= 0 {
                 return false;
@@ -365,7 +366,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             *budget -= cost;
             *end -= 1;
             let (knot, passage) = (&mut self.knots[*end], &self.passages[*end]);
-            let start = knot.smooth(*adjoint);
+            let start = knot.smooth(*adjoint, *end == last);
             *sum += knot.correction.sum();
             *adjoint = if tracked {
                 knot.track.carry_back(&start, &passage.inputs)

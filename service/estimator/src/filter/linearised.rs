@@ -145,7 +145,7 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
         Iterate { xi, eta }
     }
 
-    /// [`is_mild`], of this one.
+    /// `is_mild`, of this one.
     #[inline(always)]
     pub(super) fn is_mild(&self) -> bool {
         is_mild(&self.noise, &self.covariance)

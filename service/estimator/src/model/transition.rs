@@ -11,7 +11,7 @@
 //! ```
 //!
 //! on every side of the estimate ([`filter::Side`](crate::filter::Side) gives the blocks; E is the identity on
-//! some). F is never formed: [`Lines`] applies these lines to P from both sides. The noise, as large as a bias of
+//! some). F is never formed: `Lines` applies these lines to P from both sides. The noise, as large as a bias of
 //! covariance `psd / dt`, joins them in between. [`propagate_dense`](crate::filter::propagate_dense) is the reference.
 
 use nalgebra::{SMatrix, SVector, Vector3};

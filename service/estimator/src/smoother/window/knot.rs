@@ -73,10 +73,10 @@ impl<G: InertialState<D>, const D: usize> Passage<G, D> {
 pub(super) struct Knot<G, const D: usize> {
     /// The estimate.
     pub chi: G,
-    /// The estimate before the update that is under way.
-    pub before: G,
     /// Whether the estimate is where the motion leads from the state before: so it is until an update moves both.
     pub is_predicted: bool,
+    /// Both before the update that is under way.
+    pub before: (G, bool),
     /// The motion from the state before, where its Jacobian is frozen.
     pub track: Track,
     pub fix: Option<Fix>,
@@ -97,8 +97,8 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     pub fn new(chi: G, track: Track, predicted: &Covariance<D>) -> Self {
         Self {
             chi,
-            before: chi,
             is_predicted: true,
+            before: (chi, true),
             track,
             fix: None,
             filtered: *predicted,
@@ -111,7 +111,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
 
     /// The same in place of an older one.
     pub fn begin(&mut self, chi: G, track: Track, predicted: &Covariance<D>) {
-        (self.chi, self.before, self.is_predicted) = (chi, chi, true);
+        (self.chi, self.is_predicted) = (chi, true);
         self.track = track;
         (self.fix, self.gain) = (None, None);
         self.filtered = *predicted;

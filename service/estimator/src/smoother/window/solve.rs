@@ -233,7 +233,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         self.knots[last].unsee(&self.passages[last]);
         if steps > 0 {
             for knot in self.knots.iter_mut() {
-                knot.chi = knot.before;
+                (knot.chi, knot.is_predicted) = knot.before;
             }
         }
     }
@@ -374,7 +374,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
                 passage.transition.tr_mul(&start)
             };
             if first {
-                knot.before = knot.chi;
+                knot.before = (knot.chi, knot.is_predicted);
             }
             step::<G, S, D>(knot);
         }

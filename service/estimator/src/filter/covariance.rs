@@ -221,9 +221,16 @@ impl<const D: usize> Covariance<D> {
         w: &SMatrix<f64, D, M>,
         r: &SVector<f64, M>,
     ) -> Self {
-        let w = &w.data.0;
         let mut reduced = *self;
-        for (index, column) in reduced.0.data.0.iter_mut().enumerate() {
+        reduced.reduce(w, r);
+        reduced
+    }
+
+    /// Makes P `P - W R W^T` for a diagonal R.
+    #[inline(always)]
+    pub(crate) fn reduce<const M: usize>(&mut self, w: &SMatrix<f64, D, M>, r: &SVector<f64, M>) {
+        let w = &w.data.0;
+        for (index, column) in self.0.data.0.iter_mut().enumerate() {
             let mut factors = [0.0; M];
             for m in 0..M {
                 factors[m] = -(w[m][index] * r[m]);
@@ -237,9 +244,8 @@ impl<const D: usize> Covariance<D> {
                 combined::<D, _, _, _, _>(column, factors, w.each_ref())
             };
         }
-        mirror(&mut reduced.0);
-        put_back_negative_variances(&mut reduced.0);
-        reduced
+        mirror(&mut self.0);
+        put_back_negative_variances(&mut self.0);
     }
 
     /// The covariance after a measurement with gain K (D x M), Jacobian H (M x D) and noise N (M x M):

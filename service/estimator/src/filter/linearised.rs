@@ -67,6 +67,28 @@ fn sum_of_product<const D: usize, const M: usize>(
     sum
 }
 
+/// Whether `P - K S K^T` loses no more than three of the digits of P: the update leaves of no variance less than
+/// the thousandth part, for `tr(N^-1 S)` is above the largest ratio of S and N along any direction.
+#[inline(always)]
+pub(crate) fn is_mild<const M: usize>(
+    noise: &SMatrix<f64, M, M>,
+    innovation: &SMatrix<f64, M, M>,
+) -> bool {
+    const LARGEST_RATIO: f64 = 1e3;
+    let Some(noise) = Factor::new(noise) else {
+        return false;
+    };
+    let mut trace = 0.0;
+    for m in 0..M {
+        let mut column = SVector::<f64, M>::zeros();
+        for row in 0..M {
+            column[row] = innovation[(row, m)];
+        }
+        trace += noise.solve(&column)[m];
+    }
+    trace < LARGEST_RATIO
+}
+
 impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     /// `observation` around `chi`, which lies `xi` away from the mean of `belief`. `None` if the innovation
     /// covariance is not positive definite.
@@ -140,23 +162,10 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
         Iterate { xi, eta }
     }
 
-    /// Whether `P - K S K^T` loses no more than three of the digits of P: the update leaves of no variance less than
-    /// the thousandth part, for `tr(N^-1 S)` is above the largest ratio of S and N along any direction.
+    /// `is_mild`, of this one.
     #[inline(always)]
     pub(super) fn is_mild(&self) -> bool {
-        const LARGEST_RATIO: f64 = 1e3;
-        let Some(noise) = Factor::new(&self.noise) else {
-            return false;
-        };
-        let mut trace = 0.0;
-        for m in 0..M {
-            let mut column = SVector::<f64, M>::zeros();
-            for row in 0..M {
-                column[row] = self.covariance[(row, m)];
-            }
-            trace += noise.solve(&column)[m];
-        }
-        trace < LARGEST_RATIO
+        is_mild(&self.noise, &self.covariance)
     }
 
     /// `P H^T L^-T`, with `S = L D L^T`.

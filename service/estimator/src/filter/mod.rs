@@ -110,6 +110,7 @@ pub use gate::Gate;
 pub use hinf::{HInfinity, HInfinityGain};
 pub use late::{LEAST_SHARE, LateCorrection, LateSide};
 pub use linearised::Linearised;
+pub(crate) use linearised::is_mild;
 pub use propagate::{
     propagate, propagate_augmented, propagate_dense, propagate_in_place, propagate_odometry,
 };

@@ -23,24 +23,25 @@
 
 use core::fmt;
 use core::marker::PhantomData;
-use std::collections::VecDeque;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 
 use crate::filter::{Belief, Covariance, Left, Side, Verdict};
 use crate::model::InertialState;
-use crate::smoother::{Gaussian, Jacobians, Preintegration};
+use crate::smoother::{Jacobians, Preintegration};
 
 mod fix;
 mod knot;
 mod marginal;
 mod prior;
+mod ring;
 mod solve;
 mod track;
 
 use knot::{Knot, Passage};
 use marginal::Cover;
 use prior::Prior;
+use ring::Ring;
 use solve::{Ahead, Solve};
 use track::{InputJacobian, Track};
 
@@ -192,18 +193,18 @@ impl core::error::Error for WindowError {}
 pub struct Window<G, S, const D: usize> {
     options: WindowOptions,
     prior: Prior<G, D>,
-    /// Oldest first; never empty.
-    knots: VecDeque<Knot<G, D>>,
+    /// Never empty. One more finds room for a moment: a state enters before another leaves.
+    knots: Ring<Knot<G, D>>,
     /// Of the same states.
-    passages: VecDeque<Passage<G, D>>,
+    passages: Ring<Passage<G, D>>,
     /// How many fixes in the window have noise that differs by direction.
     anisotropic: usize,
     /// Whether the gains that are stored are those of terms which do not depend on the estimate.
     gains_hold: bool,
     /// The update that is under way.
     solve: Option<Solve<D>>,
-    /// What was predicted for the newest state before that.
-    kept: Covariance<D>,
+    /// What was predicted for the newest state before that, if it changes that.
+    kept: Option<Covariance<D>>,
     /// What has been done for the next update.
     ahead: Option<Ahead>,
     /// How far the covariance of the oldest state has come.
@@ -221,15 +222,17 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             iterations: options.iterations.max(1),
             ..*options
         };
+        let (knot, passage) = Self::beginning(first);
+        let slots = options.capacity + 1;
         let mut window = Self {
             options,
             prior: Self::first_prior(first, &options),
-            knots: VecDeque::with_capacity(options.capacity),
-            passages: VecDeque::with_capacity(options.capacity),
+            knots: Ring::new(&knot, slots),
+            passages: Ring::new(&passage, slots),
             anisotropic: 0,
             gains_hold: false,
             solve: None,
-            kept: first.covariance,
+            kept: None,
             ahead: None,
             cover: Cover::default(),
             gone: false,
@@ -244,16 +247,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         self.prior = Self::first_prior(first, &self.options);
         self.knots.clear();
         self.passages.clear();
-        let passage = Passage {
-            motion: Preintegration::new(&first.mean),
-            transition: SMatrix::identity(),
-            inputs: InputJacobian::zeros(),
-            predicted: first.covariance,
-        };
-        let track = Track::new(&passage.motion.motion().step);
-        let knot = Knot::new(first.mean, track, &first.covariance);
-        self.knots.push_back(knot);
-        self.passages.push_back(passage);
+        (*self.knots.enter(), *self.passages.enter()) = Self::beginning(first);
         self.anisotropic = 0;
         self.solve = None;
         self.ahead = None;
@@ -262,60 +256,60 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         self.gains_hold = self.is_constant();
     }
 
-    fn first_prior(first: &Belief<G, Left, D>, options: &WindowOptions) -> Prior<G, D> {
-        let at_its_mean = Gaussian {
-            mean: SVector::zeros(),
-            covariance: first.covariance,
+    /// The first state, with no motion before it.
+    fn beginning(first: &Belief<G, Left, D>) -> (Knot<G, D>, Passage<G, D>) {
+        let passage = Passage {
+            motion: Preintegration::new(&first.mean),
+            transition: SMatrix::identity(),
+            inputs: InputJacobian::zeros(),
+            predicted: first.covariance,
         };
-        Prior::new::<S>(options.first_prior, &first.mean, &at_its_mean)
+        let track = Track::new(&passage.motion.motion().step);
+        let knot = Knot::new(first.mean, track, &first.covariance);
+        (knot, passage)
+    }
+
+    fn first_prior(first: &Belief<G, Left, D>, options: &WindowOptions) -> Prior<G, D> {
+        Prior::new::<S>(options.first_prior, &first.mean, &first.covariance)
     }
 
     /// Adds the state at the end of `motion`. If the window is full its oldest state leaves first, and its last
     /// estimate, smoothed by all fixes since, is returned. An update that is under way is finished before.
     pub fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
         self.finish();
-        let newest = self.newest_knot();
-        let mut passage = Passage {
-            motion: *motion,
-            transition: SMatrix::identity(),
-            inputs: InputJacobian::zeros(),
-            predicted: newest.filtered,
-        };
+        let passage = self.passages.enter();
+        passage.motion = *motion;
+        self.knots.enter();
+        let (newest, knot) = self.knots.with_previous(self.knots.len() - 1);
         let track = passage.track(&newest.chi);
+        let (noise, inputs) = (motion.noise(), &passage.inputs);
+        track.carry_covariance(&newest.filtered, noise, inputs, &mut passage.predicted);
         let chi = track.apply(&newest.chi).normalized();
-        track.carry_covariance(
-            &newest.filtered,
-            motion.noise(),
-            &passage.inputs,
-            &mut passage.predicted,
-        );
-        let mut knot = Knot::new(chi, track, &passage.predicted);
-        let left = self.is_full().then(|| {
+        knot.begin(chi, track, &passage.predicted);
+        self.cover.forget();
+        (self.knots.len() > self.options.capacity).then(|| {
             if !self.gone {
-                self.marginalise(Some((&mut knot, &mut passage)));
+                self.marginalise();
                 self.ahead = None;
             }
             self.pop()
-        });
-        self.knots.push_back(knot);
-        self.passages.push_back(passage);
-        self.cover.forget();
-        left.flatten()
+        })
     }
 
     /// Forgets the oldest state, which has been marginalised. Gives its estimate.
-    fn pop(&mut self) -> Option<G> {
+    fn pop(&mut self) -> G {
         self.gone = false;
         if let Some(ahead) = &mut self.ahead {
             ahead.next -= 1;
         }
-        self.passages.pop_front();
-        self.knots.pop_front().map(|knot| knot.chi)
+        let left = self.knots[0].chi;
+        self.knots.leave();
+        self.passages.leave();
+        left
     }
 
-    /// Marginalises the oldest state: what is known from it becomes the prior of the next one, which is the `entering`
-    /// one if there is no other.
-    fn marginalise(&mut self, entering: Option<(&mut Knot<G, D>, &mut Passage<G, D>)>) {
+    /// Marginalises the oldest of several states: what is known from it becomes the prior of the next one.
+    fn marginalise(&mut self) {
         let (fresh, tracked) = (self.must_linearise(), self.is_tracked());
         let first = &mut self.knots[0];
         if fresh {
@@ -323,46 +317,38 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             // It was positive definite at the last update, if there is a fix.
             first.filtered = prior.covariance;
             first.weigh();
-            first.correct(prior.mean);
+            first.correct(&prior.mean);
         } else {
             let wanted = self.prior.mean_at::<S>(&first.chi);
-            first.correct(wanted);
+            first.correct(&wanted);
         }
-        let (left, mean, filtered) = (first.chi, first.correction, first.filtered);
         self.anisotropic -= usize::from(first.fix.is_some_and(|fix| !fix.is_isotropic()));
 
-        let (next, passage) = match (self.knots.get_mut(1), self.passages.get_mut(1), entering) {
-            (Some(next), Some(passage), _) => (next, passage),
-            (_, _, Some(entering)) => entering,
-            _ => return,
-        };
-        let correction = if tracked {
+        let (first, next) = self.knots.with_previous(1);
+        let passage = &mut self.passages[1];
+        let mean = if tracked {
             if !G::IS_GROUP_AFFINE {
-                next.track = passage.track(&left);
+                next.track = passage.track(&first.chi);
             }
+            let Passage {
+                motion,
+                inputs,
+                predicted,
+                ..
+            } = passage;
             if fresh {
-                let Passage {
-                    motion,
-                    inputs,
-                    predicted,
-                    ..
-                } = passage;
-                let noise = motion.noise();
-                next.track
-                    .carry_covariance(&filtered, noise, inputs, predicted);
+                let (p, q) = (&first.filtered, motion.noise());
+                next.track.carry_covariance(p, q, inputs, predicted);
             }
-            Gaussian {
-                mean: next.track.carry(&mean, &passage.inputs) + next.offset::<S>(&left),
-                covariance: passage.predicted,
-            }
+            next.track.carry(&first.correction, inputs) + next.offset::<S>(&first.chi)
         } else {
-            let (offset, predicted) = passage.link::<S>(&left, &next.chi, &filtered);
-            Gaussian {
-                mean: passage.transition * mean + offset,
-                covariance: predicted,
-            }
+            let (offset, predicted) = passage.link::<S>(&first.chi, &next.chi, &first.filtered);
+            passage.predicted = predicted;
+            passage.transition * first.correction + offset
         };
-        self.prior = Prior::new::<S>(self.options.prior, &next.chi, &correction);
+        let form = self.options.prior;
+        self.prior
+            .replace::<S>(form, &next.chi, &mean, &passage.predicted);
     }
 
     /// Whether the Jacobians of the motions' residuals are left out: then the tracks have F.
@@ -407,7 +393,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// Whether the window holds no state: never.
     pub fn is_empty(&self) -> bool {
-        self.knots.is_empty()
+        self.knots.len() == 0
     }
 
     /// Whether the next push makes the oldest state leave.

@@ -2,12 +2,13 @@
 //!
 //! All in left-invariant coordinates at the estimate of the last solve.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, SMatrix, SVector, Vector3};
 
 use super::Fix;
 use super::fix::HeadingRow;
 use super::track::{InputJacobian, Track};
-use crate::filter::{Covariance, Seen, Side};
+use crate::columns::combined;
+use crate::filter::{Covariance, Factor, Seen, Side, is_mild};
 use crate::model::InertialState;
 use crate::smoother::linearise;
 use crate::smoother::{Jacobians, Link, Preintegration};
@@ -72,8 +73,10 @@ impl<G: InertialState<D>, const D: usize> Passage<G, D> {
 pub(super) struct Knot<G, const D: usize> {
     /// The estimate.
     pub chi: G,
-    /// The estimate before the update that is under way.
-    pub before: G,
+    /// Whether the estimate is where the motion leads from the state before: so it is until an update moves both.
+    pub is_predicted: bool,
+    /// Both before the update that is under way.
+    pub before: (G, bool),
     /// The motion from the state before, where its Jacobian is frozen.
     pub track: Track,
     pub fix: Option<Fix>,
@@ -94,7 +97,8 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     pub fn new(chi: G, track: Track, predicted: &Covariance<D>) -> Self {
         Self {
             chi,
-            before: chi,
+            is_predicted: true,
+            before: (chi, true),
             track,
             fix: None,
             filtered: *predicted,
@@ -103,6 +107,14 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
             innovation: Vector3::zeros(),
             weighted: Vector3::zeros(),
         }
+    }
+
+    /// The same in place of an older one.
+    pub fn begin(&mut self, chi: G, track: Track, predicted: &Covariance<D>) {
+        (self.chi, self.is_predicted) = (chi, true);
+        self.track = track;
+        (self.fix, self.gain) = (None, None);
+        self.filtered = *predicted;
     }
 
     /// Takes the fix back.
@@ -114,7 +126,11 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
 
     /// The offset of the motion from `before`, `xi = F xi_before + offset + w`, with frozen Jacobians:
     /// minus `log(f(chi_before)^-1 chi)` of \[IS\] (14), or what the parametrisation has in its place.
+    #[inline]
     pub fn offset<S: Side>(&self, before: &G) -> SVector<f64, D> {
+        if self.is_predicted {
+            return SVector::zeros();
+        }
         let expected = self.track.apply(before);
         let residual = S::Residual::difference(&expected, &self.chi);
         if S::Residual::IS_LEFT {
@@ -133,37 +149,50 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         };
         let noise = fix.covariance_b(&self.chi);
         let row = fix.heading_row(&self.chi);
-        let h = fix.jacobian(&row);
         let p_ht = fix.covariance_with(&self.filtered, &row);
         let mut innovation = noise;
         for axis in 0..3 {
             let seen = fix.seen(&p_ht.column(axis).into_owned(), &row);
             innovation += seen * Vector3::ith(axis, 1.0).transpose();
         }
-        let Some(weight) = inverse(&innovation) else {
+        let Some(factor) = Factor::new(&innovation) else {
             return false;
         };
-        let gain = p_ht * weight;
-        self.filtered = self
-            .filtered
-            .corrected_with(&p_ht, &gain, &Seen::by(&h), &h, &noise);
+        let weight = factor.inverse();
+        let gain = times(&p_ht, &weight);
+        // As the filter does it.
+        if is_mild(&noise, &innovation) {
+            let decorrelated = factor.decorrelated_rows(&p_ht);
+            self.filtered.reduce(&decorrelated, factor.reciprocals());
+        } else {
+            let h = fix.jacobian(&row);
+            self.filtered = self
+                .filtered
+                .corrected_with(&p_ht, &gain, &Seen::by(&h), &h, &noise);
+        }
         self.gain = Some(FixGain { gain, weight, row });
         true
     }
 
     /// The filtered correction from the `predicted` one.
-    pub fn correct(&mut self, predicted: SVector<f64, D>) {
-        self.correction = predicted;
-        if let (Some(fix), Some(gain)) = (&self.fix, &self.gain) {
-            self.innovation = fix.residual_b(&self.chi) - fix.seen(&predicted, &gain.row);
-            self.weighted = gain.weight * self.innovation;
-            self.correction += gain.gain * self.innovation;
-        }
+    #[inline]
+    pub fn correct(&mut self, predicted: &SVector<f64, D>) {
+        let (Some(fix), Some(gain)) = (&self.fix, &self.gain) else {
+            self.correction = *predicted;
+            return;
+        };
+        self.innovation = fix.residual_b(&self.chi) - fix.seen(predicted, &gain.row);
+        self.weighted = gain.weight * self.innovation;
+        self.correction = plus_product(predicted, &gain.gain, &self.innovation);
     }
 
-    /// The smoothed correction, from the adjoint at the end of this state; gives the adjoint at its beginning.
-    pub fn smooth(&mut self, adjoint: SVector<f64, D>) -> SVector<f64, D> {
-        self.correction += self.filtered.matrix() * adjoint;
+    /// The smoothed correction, from the adjoint at the end of this state, zero if it is the newest; gives the adjoint at
+    /// its beginning.
+    #[inline]
+    pub fn smooth(&mut self, adjoint: SVector<f64, D>, is_newest: bool) -> SVector<f64, D> {
+        if !is_newest {
+            self.correction = plus_product(&self.correction, self.filtered.matrix(), &adjoint);
+        }
         match (&self.fix, &self.gain) {
             (Some(fix), Some(gain)) => {
                 let weight = self.weighted - gain.gain.tr_mul(&adjoint);
@@ -187,28 +216,24 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
     }
 }
 
-/// The inverse of a symmetric matrix by its Cholesky factor; `None` if it is not positive definite.
-fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    // The factor's rows, their diagonal inverted.
-    let root = |square: f64| (square > 0.0).then(|| 1.0 / square.sqrt());
-    let d0 = root(s[(0, 0)])?;
-    let (l10, l20) = (s[(1, 0)] * d0, s[(2, 0)] * d0);
-    let d1 = root(s[(1, 1)] - l10 * l10)?;
-    let l21 = (s[(2, 1)] - l20 * l10) * d1;
-    let d2 = root(s[(2, 2)] - l20 * l20 - l21 * l21)?;
-    // The inverse of the factor, of which the inverse is the square.
-    let (i10, i21) = (-l10 * d0 * d1, -l21 * d1 * d2);
-    let i20 = -(l20 * d0 + l21 * i10) * d2;
-    let (m01, m02, m12) = (i10 * d1 + i20 * i21, i20 * d2, i21 * d2);
-    Some(Matrix3::new(
-        d0 * d0 + i10 * i10 + i20 * i20,
-        m01,
-        m02,
-        m01,
-        d1 * d1 + i21 * i21,
-        m12,
-        m02,
-        m12,
-        d2 * d2,
-    ))
+/// `sum + M x`.
+#[inline]
+fn plus_product<const D: usize, const N: usize>(
+    sum: &SVector<f64, D>,
+    m: &SMatrix<f64, D, N>,
+    x: &SVector<f64, N>,
+) -> SVector<f64, D> {
+    let ([sum], [x]) = (&sum.data.0, x.data.0);
+    let column = combined::<D, D, D, D, N>(sum, x, m.data.0.each_ref());
+    SVector::from_array_storage(ArrayStorage([column]))
+}
+
+/// `A S`.
+#[inline]
+fn times<const D: usize>(a: &SMatrix<f64, D, 3>, s: &Matrix3<f64>) -> SMatrix<f64, D, 3> {
+    let columns = s
+        .data
+        .0
+        .map(|factors| combined::<D, D, D, D, 3>(&[0.0; D], factors, a.data.0.each_ref()));
+    SMatrix::from_array_storage(ArrayStorage(columns))
 }

@@ -42,32 +42,49 @@ pub(super) struct Prior<G, const D: usize> {
 }
 
 impl<G: LieGroup<D>, const D: usize> Prior<G, D> {
-    /// The prior of this form from a correction of `chi_lin` in left-invariant coordinates.
-    pub(super) fn new<S: Side>(form: PriorForm, chi_lin: &G, left: &Gaussian<D>) -> Self {
-        let (mean, covariance) = if S::IS_LEFT {
-            (left.mean, left.covariance)
+    /// The prior of this form that wants `first` as it is.
+    pub(super) fn new<S: Side>(
+        form: PriorForm,
+        first: &G,
+        left_covariance: &Covariance<D>,
+    ) -> Self {
+        let mut prior = Self {
+            form,
+            anchor: *first,
+            offset: SVector::zeros(),
+            covariance: *left_covariance,
+        };
+        prior.replace::<S>(form, first, &SVector::zeros(), left_covariance);
+        prior
+    }
+
+    /// Becomes the prior of this form from a correction of `chi_lin`, of this mean and covariance in left-invariant
+    /// coordinates.
+    pub(super) fn replace<S: Side>(
+        &mut self,
+        form: PriorForm,
+        chi_lin: &G,
+        left_mean: &SVector<f64, D>,
+        left_covariance: &Covariance<D>,
+    ) {
+        let mut mean = *left_mean;
+        if S::IS_LEFT {
+            self.covariance = *left_covariance;
         } else {
             let from_left = S::from_left(chi_lin);
-            (
-                from_left * left.mean,
-                left.covariance.transformed(&from_left),
-            )
-        };
-        let on_group = || S::retract(chi_lin, &mean);
-        let (anchor, offset, covariance) = match form {
-            PriorForm::GroupMean => (on_group(), SVector::zeros(), covariance),
-            PriorForm::Linear => (*chi_lin, mean, covariance),
-            PriorForm::Recentred => {
-                let carried = covariance.transformed(&S::jacobian::<G, D>(&mean));
-                (on_group(), SVector::zeros(), carried)
+            mean = from_left * left_mean;
+            self.covariance = left_covariance.transformed(&from_left);
+        }
+        if form == PriorForm::Recentred {
+            self.covariance = self.covariance.transformed(&S::jacobian::<G, D>(&mean));
+        }
+        self.form = form;
+        (self.anchor, self.offset) = match form {
+            PriorForm::Linear => (*chi_lin, mean),
+            PriorForm::GroupMean | PriorForm::Recentred => {
+                (S::retract(chi_lin, &mean), SVector::zeros())
             }
         };
-        Self {
-            form,
-            anchor,
-            offset,
-            covariance,
-        }
     }
 
     /// Whether the covariance at an estimate does not depend on the estimate.

@@ -100,7 +100,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
                 iterations: self.options.iterations,
             },
         });
-        self.kept = self.passages[last].predicted;
+        self.kept = fresh.then(|| self.passages[last].predicted);
         Ok(())
     }
 
@@ -116,7 +116,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
             return false;
         }
         if self.is_full() && !self.gone {
-            self.marginalise(None);
+            self.marginalise();
             self.gone = true;
             *budget -= self.work_of_push();
         }
@@ -224,14 +224,16 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     /// Undoes an update of so many steps.
     fn take_back(&mut self, steps: usize) {
         let last = self.knots.len() - 1;
-        self.passages[last].predicted = self.kept;
+        if let Some(predicted) = &self.kept {
+            self.passages[last].predicted = *predicted;
+        }
         if let Some(fix) = &self.knots[last].fix {
             self.anisotropic -= usize::from(!fix.is_isotropic());
         }
         self.knots[last].unsee(&self.passages[last]);
         if steps > 0 {
-            for knot in &mut self.knots {
-                knot.chi = knot.before;
+            for knot in self.knots.iter_mut() {
+                (knot.chi, knot.is_predicted) = knot.before;
             }
         }
     }
@@ -291,26 +293,25 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
         let cost = self.work_forward();
         let first = usize::from(self.gone);
         let last = self.knots.len() - 1;
-        let from = (*next).max(first + 1) - 1;
-        let mut states = self.knots.iter_mut().zip(&mut self.passages).skip(from);
-        let mut before: Option<&Knot<G, D>> = None;
-        if *next > first {
-            before = states.next().map(|(knot, _)| &*knot);
-        }
-        for (index, (knot, passage)) in (*next..).zip(states) {
+        for index in (*next).max(first)..=last {
             if *budget <= 0 {
                 *next = index;
                 return Ok(false);
             }
             *budget -= cost;
-            let mean = match before {
-                None if fresh => {
+            let passage = &mut self.passages[index];
+            let mean = if index == first {
+                let knot = &mut self.knots[index];
+                if fresh {
                     let prior = self.prior.at::<S>(&knot.chi);
                     knot.filtered = prior.covariance;
                     prior.mean
+                } else {
+                    self.prior.mean_at::<S>(&knot.chi)
                 }
-                None => self.prior.mean_at::<S>(&knot.chi),
-                Some(before) if tracked => {
+            } else {
+                let (before, knot) = self.knots.with_previous(index);
+                if tracked {
                     if !G::IS_GROUP_AFFINE {
                         knot.track = passage.track(&before.chi);
                     }
@@ -321,14 +322,14 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
                         track.carry_covariance(p, q, inputs, &mut knot.filtered);
                     }
                     knot.track.carry(&before.correction, inputs) + knot.offset::<S>(&before.chi)
-                }
-                Some(before) => {
+                } else {
                     let (offset, predicted) =
                         passage.link::<S>(&before.chi, &knot.chi, &before.filtered);
                     knot.filtered = predicted;
                     passage.transition * before.correction + offset
                 }
             };
+            let knot = &mut self.knots[index];
             if fresh && (constant || index == last) {
                 passage.predicted = knot.filtered;
             } else if index == last {
@@ -338,8 +339,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
                 self.gains_hold = false;
                 return Err(WindowError::InnovationNotPositiveDefinite);
             }
-            knot.correct(mean);
-            before = Some(knot);
+            knot.correct(&mean);
         }
         self.gains_hold = constant;
         *next = last + 1;
@@ -358,17 +358,15 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     ) -> bool {
         let tracked = self.is_tracked();
         let cost = self.work_back();
-        let states = self
-            .knots
-            .range_mut(..*end)
-            .zip(self.passages.range(..*end));
-        for (knot, passage) in states.rev() {
+        let last = self.knots.len() - 1;
+        while *end > 0 {
             if *budget <= 0 {
                 return false;
             }
             *budget -= cost;
             *end -= 1;
-            let start = knot.smooth(*adjoint);
+            let (knot, passage) = (&mut self.knots[*end], &self.passages[*end]);
+            let start = knot.smooth(*adjoint, *end == last);
             *sum += knot.correction.sum();
             *adjoint = if tracked {
                 knot.track.carry_back(&start, &passage.inputs)
@@ -376,7 +374,7 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
                 passage.transition.tr_mul(&start)
             };
             if first {
-                knot.before = knot.chi;
+                knot.before = (knot.chi, knot.is_predicted);
             }
             step::<G, S, D>(knot);
         }
@@ -392,4 +390,5 @@ fn step<G: InertialState<D>, S: Side, const D: usize>(knot: &mut Knot<G, D>) {
         S::from_left(&knot.chi) * knot.correction
     };
     knot.chi = S::retract(&knot.chi, &xi);
+    knot.is_predicted = false;
 }

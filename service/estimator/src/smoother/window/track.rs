@@ -12,10 +12,10 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use crate::columns::{Column, combined};
 use crate::filter::Covariance;
+use crate::lanes::Block;
 use crate::lie::{LieGroup, SE23, SO3};
-use crate::model::{Automorphism, FreeMotion, GroupAffineStep, InertialState};
+use crate::model::{Automorphism, FreeMotion, GroupAffineStep, InertialState, Lines};
 
 /// B, 9 x 6: how the inputs, and with a minus the biases, enter a motion.
 pub(super) type InputJacobian = SMatrix<f64, 9, 6>;
@@ -121,6 +121,7 @@ impl Track {
     }
 
     /// `F P F^T + Q`, into `result`.
+    #[inline]
     pub fn carry_covariance<const D: usize>(
         &self,
         p: &Covariance<D>,
@@ -128,102 +129,26 @@ impl Track {
         inputs: &InputJacobian,
         result: &mut Covariance<D>,
     ) {
-        let (p, q) = (p.matrix(), q.matrix());
-        // Of all rows of P: T A above and M^T = (T C)^T below, where P = [A C; C^T S].
-        let carried = self.times_transposed::<D, D, D>(&p.data.0);
-        let mut across = [[0.0; 9]; 9];
-        for row in 0..9 {
-            for column in 0..9 {
-                across[row][column] = carried[column][row];
-            }
-        }
-        let turned = self.times_transposed::<9, 3, 6>(&across);
-        result.change_symmetrically(|result| {
-            result.copy_from(q);
-            let columns = result.data.0.iter_mut().zip(&turned).enumerate();
-            for (column, (sum, turned)) in columns {
-                for (sum, turned) in sum[..=column].iter_mut().zip(turned) {
-                    *sum += turned;
-                }
-            }
-            if D > 9 {
-                add_biases(p, &carried, inputs, result);
-            }
-            result.fill_lower_triangle_with_upper_triangle();
-        });
+        let (p, q) = (&p.matrix().data.0, &q.matrix().data.0);
+        let lines = self.lines(inputs);
+        result.change_symmetrically(|result| lines.carry(p, q, &mut result.data.0));
     }
 
-    /// `A T^T` of the first nine columns of A: every row carried. In the first columns, those of the rotation, as many rows
-    /// as FIRST says, in the velocity's SECOND; the others are without meaning.
+    /// F by its lines. A force does not turn the body: that part of B is zero.
     #[inline]
-    fn times_transposed<const ROWS: usize, const FIRST: usize, const SECOND: usize>(
-        &self,
-        a: &[Column<ROWS>],
-    ) -> [Column<ROWS>; 9] {
-        let (u, dt_s) = (&self.step.body, self.step.automorphism.dt_s);
-        let (v, p) = (&u.velocity, &u.position);
-        let (a0, a1, a2) = (&a[0], &a[1], &a[2]);
-        let velocity = |axis: usize, factors, arms| {
-            combined::<SECOND, ROWS, ROWS, ROWS, 2>(&a[3 + axis], factors, arms)
+    fn lines(&self, inputs: &InputJacobian) -> Lines {
+        let block = |row: usize, column: usize| {
+            Block::from_columns(core::array::from_fn(|j| {
+                core::array::from_fn(|i| inputs[(row + i, column + j)])
+            }))
         };
-        let position = |axis: usize, [one, other]: [f64; 2], [left, right]: [&Column<ROWS>; 2]| {
-            let columns = [&a[3 + axis], left, right];
-            combined::<ROWS, ROWS, ROWS, ROWS, 3>(&a[6 + axis], [dt_s, one, other], columns)
-        };
-        let velocity = [
-            velocity(0, [v.z, -v.y], [a1, a2]),
-            velocity(1, [v.x, -v.z], [a2, a0]),
-            velocity(2, [v.y, -v.x], [a0, a1]),
-        ];
-        let position = [
-            position(0, [p.z, -p.y], [a1, a2]),
-            position(1, [p.x, -p.z], [a2, a0]),
-            position(2, [p.y, -p.x], [a0, a1]),
-        ];
-        let mut result = [[0.0; ROWS]; 9];
-        for axis in 0..3 {
-            let turn: [f64; 3] = core::array::from_fn(|row| self.turn[(row, axis)]);
-            result[axis] = combined::<FIRST, ROWS, ROWS, ROWS, 3>(&[0.0; ROWS], turn, [a0, a1, a2]);
-            result[3 + axis] =
-                combined::<SECOND, ROWS, ROWS, ROWS, 3>(&[0.0; ROWS], turn, velocity.each_ref());
-            result[6 + axis] =
-                combined::<ROWS, ROWS, ROWS, ROWS, 3>(&[0.0; ROWS], turn, position.each_ref());
-        }
-        result
-    }
-}
-
-/// What the biases add to the upper triangle of `F P F^T`: `-M B^T - B C'^T` above, where `C' = M - B S` is
-/// what lies between, and S.
-fn add_biases<const D: usize>(
-    p: &SMatrix<f64, D, D>,
-    carried: &[[f64; D]; 9],
-    inputs: &InputJacobian,
-    result: &mut SMatrix<f64, D, D>,
-) {
-    let b = &inputs.data.0;
-    let (mut m, mut between) = ([[0.0; 9]; 6], [[0.0; 9]; 6]);
-    for bias in 0..6 {
-        for row in 0..9 {
-            m[bias][row] = carried[row][9 + bias];
-        }
-        let s = core::array::from_fn(|k| -p[(9 + k, 9 + bias)]);
-        between[bias] = combined::<9, 9, 9, 9, 6>(&m[bias], s, b.each_ref());
-        let column = &mut result.data.0[9 + bias];
-        for row in 0..9 {
-            column[row] += between[bias][row];
-        }
-        for row in 9..D {
-            column[row] += p[(row, 9 + bias)];
-        }
-    }
-    for column in 0..9 {
-        let by_b = core::array::from_fn(|k| -b[k][column]);
-        let by_between = core::array::from_fn(|k| -between[k][column]);
-        let sum = &mut result.data.0[column];
-        let start: [f64; 9] = core::array::from_fn(|row| sum[row]);
-        let half = combined::<9, 9, 9, 9, 6>(&start, by_b, m.each_ref());
-        let whole = combined::<9, 9, 9, 9, 6>(&half, by_between, b.each_ref());
-        sum[..9].copy_from_slice(&whole);
+        let u = &self.step.body;
+        Lines::new(
+            self.step.automorphism.dt_s,
+            Some(Block::from_columns(self.turn.transpose().data.0)),
+            &[-u.velocity, -u.position],
+            [block(0, 0), block(3, 0), block(6, 0)],
+            [block(3, 3), block(6, 3)],
+        )
     }
 }

@@ -5,11 +5,12 @@ use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use inekf_service::config::Config;
+use inekf_service::daemon::guard::Guard;
 use inekf_service::daemon::run::run;
 use inekf_service::daemon::{Ports, Terms, Vehicle};
 use inekf_service::engine::{self, Engine, History, Model, Use};
 use inekf_shared::message::{EstimateSe23, Zero};
-use inekf_shared::transport;
+use inekf_shared::transport::{self, Watched};
 use inekf_tests::link::instance;
 use inekf_tests::memory::Memory;
 
@@ -31,7 +32,7 @@ impl Use for Serve<'_> {
 
     fn with<M: Model + 'static, H: History<M> + 'static>(self, engine: Engine<M, H>) {
         let node = Rc::new(self.memory.node());
-        let ports = Ports::open_on(node, &instance(INSTANCE), self.config, false);
+        let ports = Ports::open_on(Rc::clone(&node), &instance(INSTANCE), self.config, false);
         let terms = Terms {
             config: self.config,
             config_text: CONFIG,
@@ -39,9 +40,11 @@ impl Use for Serve<'_> {
             unused_checkpoint: false,
         };
         let vehicle = Vehicle::new(engine, ports.expect("ports"), terms, None);
+        let guard = Guard::of(Watched::of(&node).expect("the files"));
+        let runtime = &self.config.runtime;
         watch_this_thread();
         self.is_ready.store(true, Ordering::Release);
-        run(&mut [Box::new(vehicle)], &self.config.runtime, self.stop).expect("it runs");
+        run(&mut [Box::new(vehicle)], runtime, &guard, self.stop).expect("it runs");
     }
 }
 

@@ -32,13 +32,12 @@ pub(super) fn is_complete(segment: &Metadata) -> bool {
     segment.len() > 0 && segment.permissions().mode() & OWNER_READ != 0
 }
 
-/// Removes the segments under the prefix that are not complete and older than the creation timeout; returns how many.
-fn remove(config: &Config) -> usize {
+/// Removes the segments under the prefix that are not complete and older than the creation timeout.
+fn remove(config: &Config) {
     let prefix = config.global.prefix.to_string();
     let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
-        return 0;
+        return;
     };
-    let mut removed = 0;
     for entry in entries.filter_map(Result::ok) {
         let is_stillborn = entry.file_name().to_string_lossy().starts_with(&prefix)
             && entry.metadata().is_ok_and(|metadata| {
@@ -46,9 +45,11 @@ fn remove(config: &Config) -> usize {
                     && !is_complete(&metadata)
                     && age(&metadata) > config.global.creation_timeout
             });
-        removed += usize::from(is_stillborn && fs::remove_file(entry.path()).is_ok());
+        if is_stillborn {
+            // Another may have been faster; of another user's nothing can be removed.
+            let _ = fs::remove_file(entry.path());
+        }
     }
-    removed
 }
 
 fn age(metadata: &Metadata) -> Duration {

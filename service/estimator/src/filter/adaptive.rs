@@ -68,16 +68,16 @@ pub struct Adaptive<G, const B: usize, const P: usize, const D: usize, const S: 
 /// What an observation did to a bank.
 ///
 /// ```
-/// # use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
-/// # use inekf::lie::{LieGroup, SE2};
 /// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
-/// # use nalgebra::{Matrix2, Vector2, Vector3};
-/// use inekf::filter::{Gate, Verdict};
+/// # use nalgebra::{Matrix2, Vector2};
+/// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Gate, Left, UpdateOptions, Verdict, standard_modes};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::Vector3;
 ///
-/// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-/// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-/// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-/// # let (modes, switching) = standard_modes(&[wheel], 0.1);
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+/// let (modes, switching) = standard_modes(&[wheel], 0.1);
 /// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
 /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
 /// #     position_w: Vector2::new(x_m, 0.0),
@@ -85,7 +85,8 @@ pub struct Adaptive<G, const B: usize, const P: usize, const D: usize, const S: 
 /// #     lever_arm_b: Vector2::zeros(),
 /// #     scale_error: 0.0,
 /// # }]));
-/// # let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+/// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+///
 /// // Two metres off where the variance of that is 1 + 1, in every mode.
 /// let weighed = bank.update_through(&fix_at(2.0), &Gate::OPEN)?;
 /// assert!(weighed.verdict == Verdict::Accepted && (weighed.nis - 2.0).abs() < 1e-9);
@@ -131,16 +132,14 @@ where
     /// `options` is the bank's, see [`update`](Self::update).
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, Expected, Left, standard_modes};
-    /// # use inekf::lie::LieGroup;
-    /// # use nalgebra::Vector3;
-    /// use inekf::filter::{Adaptive, UpdateOptions};
-    /// use inekf::lie::SE2;
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-    /// # let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
     /// let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
     /// // The scale is known as the modes expect it, each by its weight.
     /// let variances = modes.iter().map(|mode| mode.entry_sigma[0].powi(2));
@@ -183,16 +182,15 @@ where
     /// The weights are not negative, and not all zero; they are made to add up to one.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, Expected, Left, standard_modes};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use nalgebra::Vector3;
-    /// use inekf::filter::{Adaptive, UpdateOptions};
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-    /// # let (modes, switching) = standard_modes(&[wheel], 0.1);
-    /// # let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
     /// let known = bank.estimate();
     /// let resumed = Adaptive::resumed(&known, [2.0; 9], modes, switching, UpdateOptions::PLAIN);
     /// // The weights are made to add up to one; what was known is known.
@@ -222,25 +220,17 @@ where
     /// step's noise, B x B, of the left-invariant error.
     ///
     /// ```
-    /// # use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
-    /// # use nalgebra::{Matrix2, Vector2};
-    /// use inekf::model::OdometryStep;
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{OdometryStep, ProcessMismatch, Unknowns};
     /// use nalgebra::{Matrix3, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-    /// # let (modes, switching) = standard_modes(&[wheel], 0.1);
-    /// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
-    /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
-    /// #     position_w: Vector2::new(x_m, 0.0),
-    /// #     covariance_w: Matrix2::identity(),
-    /// #     lever_arm_b: Vector2::zeros(),
-    /// #     scale_error: 0.0,
-    /// # }]));
-    /// # let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
     /// let ahead = OdometryStep::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
     /// bank.advance(&unknowns, &ahead, &Matrix3::zeros());
     /// // Ten metres as it is seen; what is not known of the wheel joins what was not known of the place.
@@ -281,16 +271,16 @@ where
     /// observation is gated.
     ///
     /// ```
-    /// # use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
-    /// # use inekf::lie::{LieGroup, SE2};
     /// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
-    /// # use nalgebra::{Matrix2, Vector2, Vector3};
-    /// use inekf::filter::Verdict;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, Verdict, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-    /// # let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
     /// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
     /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
     /// #     position_w: Vector2::new(x_m, 0.0),
@@ -298,7 +288,8 @@ where
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # }]));
-    /// # let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    ///
     /// // A fix as good as what was known: half way.
     /// assert_eq!(bank.update(&fix_at(0.5))?, Verdict::Accepted);
     /// assert!((bank.estimate().mean.pose.position.x - 0.25).abs() < 1e-9);
@@ -318,16 +309,16 @@ where
     /// As [`update`](Self::update).
     ///
     /// ```
-    /// # use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
-    /// # use inekf::lie::{LieGroup, SE2};
     /// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
-    /// # use nalgebra::{Matrix2, Vector2, Vector3};
-    /// use inekf::filter::{Gate, Verdict};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Gate, Left, UpdateOptions, Verdict, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-    /// # let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
     /// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
     /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
     /// #     position_w: Vector2::new(x_m, 0.0),
@@ -335,7 +326,8 @@ where
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # }]));
-    /// # let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    ///
     /// // A hundred metres off, which no mode explains.
     /// let before = bank;
     /// let weighed = bank.update_through(&fix_at(100.0), &Gate::of_probability(0.99))?;
@@ -388,14 +380,15 @@ where
     /// The same bank with the covariance of every mode as `f` makes it.
     ///
     /// ```
-    /// # use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use nalgebra::Vector3;
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-    /// # let (modes, switching) = standard_modes(&[wheel], 0.1);
-    /// # let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
     /// // All standard deviations twice as large.
     /// let wider = bank.with_covariances(|p| p.scaled(4.0));
     /// assert_eq!(wider.weights(), bank.weights());
@@ -413,25 +406,25 @@ where
     /// The weights of the modes, which add up to one.
     ///
     /// ```
-    /// # use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
+    /// # use inekf::model::{PlanarFix, PointFix};
     /// # use nalgebra::{Matrix2, Vector2};
-    /// use inekf::model::OdometryStep;
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{OdometryStep, ProcessMismatch, Unknowns};
     /// use nalgebra::{Matrix3, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-    /// # let (modes, switching) = standard_modes(&[wheel], 0.1);
-    /// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
     /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
     /// #     position_w: Vector2::new(x_m, 0.0),
     /// #     covariance_w: Matrix2::identity(),
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # }]));
-    /// # let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
     /// let ahead = OdometryStep::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
     /// bank.advance(&unknowns, &ahead, &Matrix3::zeros());
     /// bank.update(&fix_at(20.0))?;
@@ -447,25 +440,25 @@ where
     /// The estimate of pose and mismatches: the one Gaussian with the moments of the bank.
     ///
     /// ```
-    /// # use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
+    /// # use inekf::model::{PlanarFix, PointFix};
     /// # use nalgebra::{Matrix2, Vector2};
-    /// use inekf::model::OdometryStep;
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{OdometryStep, ProcessMismatch, Unknowns};
     /// use nalgebra::{Matrix3, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
-    /// # let (modes, switching) = standard_modes(&[wheel], 0.1);
-    /// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
     /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
     /// #     position_w: Vector2::new(x_m, 0.0),
     /// #     covariance_w: Matrix2::identity(),
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # }]));
-    /// # let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
     /// let ahead = OdometryStep::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
     /// bank.advance(&unknowns, &ahead, &Matrix3::zeros());
     /// bank.update(&fix_at(15.0))?;

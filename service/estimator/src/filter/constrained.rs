@@ -60,13 +60,12 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
     /// The rule for an update of `belief` with `points`, after the motion of `process`.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, Left, Linearised};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{PlanarPair, PointFix, ProcessColumns, ProcessMismatch};
-    /// # use nalgebra::{Matrix2, SVector, Vector2, Vector3};
-    /// use inekf::filter::{Constrained, GainRule};
-    /// use inekf::model::{Declared, OutputMismatch};
-    /// use nalgebra::Vector4;
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Constrained, Covariance, GainRule, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Declared, OutputMismatch, PlanarPair, ProcessColumns, ProcessMismatch};
+    /// use nalgebra::{SVector, Vector3, Vector4};
     ///
     /// # let fix = |x_m: f64| PointFix {
     /// #     position_w: Vector2::new(x_m, 0.0),
@@ -74,13 +73,13 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # };
-    /// # let points = PlanarPair::new([fix(9.5), fix(20.0)]);
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let mut belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # belief.mean.position.x = 10.0;
-    /// # let process = ProcessColumns::<3, ProcessMismatch>::new(&[]).expect("none");
-    /// # let noise = points.noise_covariance();
-    /// # let linearised = Linearised::at(&belief, &points, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let points = PlanarPair::new([fix(9.5), fix(20.0)]);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let mut belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// belief.mean.position.x = 10.0;
+    /// let process = ProcessColumns::<3, ProcessMismatch>::new(&[]).expect("none");
+    /// let noise = points.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &points, &belief.mean, &SVector::zeros(), &noise).expect("definite");
     /// let outputs = [Declared::hard(OutputMismatch::MeasurementScale { source: 1 })];
     /// let rule = Constrained::new(&belief, &process, &outputs, &points);
     /// // What a wrong scale of the second source adds at ten metres is not followed.
@@ -164,12 +163,12 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
     /// [`UpdateError::TooManyConstraints`].
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, Left, Linearised};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{PlanarPair, PointFix, ProcessColumns, ProcessMismatch};
-    /// # use nalgebra::{Matrix2, SVector, Vector2, Vector3};
-    /// use inekf::filter::Constrained;
-    /// use inekf::model::{Declared, OutputMismatch};
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Constrained, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Declared, OutputMismatch, PlanarPair, ProcessColumns, ProcessMismatch};
+    /// use nalgebra::{SVector, Vector3};
     ///
     /// # let fix = |x_m: f64| PointFix {
     /// #     position_w: Vector2::new(x_m, 0.0),
@@ -177,13 +176,13 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # };
-    /// # let points = PlanarPair::new([fix(9.5), fix(20.0)]);
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let mut belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # belief.mean.position.x = 10.0;
-    /// # let process = ProcessColumns::<3, ProcessMismatch>::new(&[]).expect("none");
-    /// # let noise = points.noise_covariance();
-    /// # let linearised = Linearised::at(&belief, &points, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let points = PlanarPair::new([fix(9.5), fix(20.0)]);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let mut belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// belief.mean.position.x = 10.0;
+    /// let process = ProcessColumns::<3, ProcessMismatch>::new(&[]).expect("none");
+    /// let noise = points.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &points, &belief.mean, &SVector::zeros(), &noise).expect("definite");
     /// let outputs = [Declared::hard(OutputMismatch::MeasurementScale { source: 1 })];
     /// let rule = Constrained::new(&belief, &process, &outputs, &points);
     /// // L Delta = T.

@@ -122,25 +122,14 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     /// [`UpdateError::TooManyConstraints`] beyond [`MAX_COLUMNS`]; nothing is added then.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{Columns, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, SVector, Vector2, Vector3};
-    /// use inekf::filter::UpdateError;
+    /// use inekf::filter::{Constraints, UpdateError};
     /// use inekf::filter::constraint::MAX_COLUMNS;
+    /// use inekf::model::Columns;
+    /// use nalgebra::{Vector2, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let fix = PlanarFix::new([PointFix {
-    /// #     position_w: Vector2::new(1.0, 1.0),
-    /// #     covariance_w: Matrix2::identity(),
-    /// #     lever_arm_b: Vector2::zeros(),
-    /// #     scale_error: 0.0,
-    /// # }]);
-    /// # let noise = fix.noise_covariance();
-    /// # let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
-    /// # let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
-    /// # let mut constraints = Constraints::<3, 2>::default();
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
+    ///
     /// for _ in 0..MAX_COLUMNS {
     ///     constraints.push(&along_x, &no_motion, 0.1)?;
     /// }
@@ -174,25 +163,13 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     /// The columns of (Delta, T), as they were added.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised, UpdateError};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, SVector};
+    /// # use inekf::filter::UpdateError;
+    /// use inekf::filter::Constraints;
     /// use inekf::model::Columns;
     /// use nalgebra::{Vector2, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let fix = PlanarFix::new([PointFix {
-    /// #     position_w: Vector2::new(1.0, 1.0),
-    /// #     covariance_w: Matrix2::identity(),
-    /// #     lever_arm_b: Vector2::zeros(),
-    /// #     scale_error: 0.0,
-    /// # }]);
-    /// # let noise = fix.noise_covariance();
-    /// # let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
-    /// # let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
-    /// # let mut constraints = Constraints::<3, 2>::default();
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
     /// constraints.push(&along_x, &Columns::one(Vector3::y()), f64::INFINITY)?;
     /// assert_eq!(constraints.columns().next(), Some((&Vector2::x(), &Vector3::y())));
     /// # Ok::<(), UpdateError>(())
@@ -318,26 +295,12 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     /// [`UpdateError::UnsolvableConstraints`].
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, SVector};
-    /// use inekf::filter::UpdateError;
+    /// use inekf::filter::{Constraints, UpdateError};
     /// use inekf::model::Columns;
     /// use nalgebra::{Vector2, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let fix = PlanarFix::new([PointFix {
-    /// #     position_w: Vector2::new(1.0, 1.0),
-    /// #     covariance_w: Matrix2::identity(),
-    /// #     lever_arm_b: Vector2::zeros(),
-    /// #     scale_error: 0.0,
-    /// # }]);
-    /// # let noise = fix.noise_covariance();
-    /// # let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
-    /// # let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
-    /// # let mut constraints = Constraints::<3, 2>::default();
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
     /// constraints.push(&along_x, &no_motion, f64::INFINITY)?;
     /// constraints.push(&Columns::one(2.0 * Vector2::x()), &no_motion, f64::INFINITY)?;
     /// // The second says what the first says.
@@ -357,22 +320,26 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     /// [`UpdateError::UnsolvableConstraints`], or that S with the soft constraints is not positive definite.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised, UpdateError};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{Columns, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, SVector, Vector2, Vector3};
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # use inekf::filter::UpdateError;
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Matrix2;
+    /// use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::Columns;
+    /// use nalgebra::{SVector, Vector2, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
     /// # let fix = PlanarFix::new([PointFix {
     /// #     position_w: Vector2::new(1.0, 1.0),
     /// #     covariance_w: Matrix2::identity(),
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # }]);
-    /// # let noise = fix.noise_covariance();
-    /// # let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
-    /// # let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
-    /// # let mut constraints = Constraints::<3, 2>::default();
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
     /// // Soft: a variance more along x, P / (P + N + sigma^2).
     /// constraints.push(&along_x, &no_motion, 1.0)?;
     /// let gain = constraints.gain(&linearised)?;
@@ -401,22 +368,26 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     /// As [`gain`](Self::gain).
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised, UpdateError};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{Columns, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, SVector, Vector2, Vector3};
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # use inekf::filter::UpdateError;
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Matrix2;
+    /// use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::Columns;
+    /// use nalgebra::{SVector, Vector2, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
     /// # let fix = PlanarFix::new([PointFix {
     /// #     position_w: Vector2::new(1.0, 1.0),
     /// #     covariance_w: Matrix2::identity(),
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # }]);
-    /// # let noise = fix.noise_covariance();
-    /// # let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
-    /// # let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
-    /// # let mut constraints = Constraints::<3, 2>::default();
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
     /// // A metre off along both axes, of variance 2. Along x nothing can be said: what is left is that along y.
     /// constraints.push(&along_x, &no_motion, f64::INFINITY)?;
     /// let judgement = constraints.judge(&linearised)?;
@@ -443,24 +414,26 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     /// `sigma^2 (T - L Delta)(T - L Delta)^T`. Hard constraints add nothing: there `L Delta = T`.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised, UpdateError};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{Columns, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, SVector, Vector2};
-    /// use nalgebra::Vector3;
+    /// # use inekf::filter::UpdateError;
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Matrix2;
+    /// use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::Columns;
+    /// use nalgebra::{SVector, Vector2, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
     /// # let fix = PlanarFix::new([PointFix {
     /// #     position_w: Vector2::new(1.0, 1.0),
     /// #     covariance_w: Matrix2::identity(),
     /// #     lever_arm_b: Vector2::zeros(),
     /// #     scale_error: 0.0,
     /// # }]);
-    /// # let noise = fix.noise_covariance();
-    /// # let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
-    /// # let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
-    /// # let mut constraints = Constraints::<3, 2>::default();
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
     /// constraints.push(&along_x, &no_motion, f64::INFINITY)?;
     /// let gain = constraints.gain(&linearised)?;
     /// // Nothing is learnt along x, half along y.

@@ -81,28 +81,15 @@ impl<G: LieGroup<D>, S: LateSide, const D: usize> LateCorrection<G, S, D> {
     /// What changed from `before` the measurement to `after` it.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, Left, UpdateOptions, propagate_odometry, update};
-    /// # use inekf::lie::SE2;
-    /// # use inekf::model::{OdometryStep, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-    /// use inekf::filter::LateCorrection;
-    /// use inekf::lie::LieGroup;
-    /// use inekf::model::Drift;
+    /// use inekf::filter::{Belief, Covariance, LateCorrection, Left, propagate_odometry};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Drift, OdometryStep};
+    /// use nalgebra::{Matrix3, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
-    /// # let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
-    /// # let corrected_by = |variance: f64| {
-    /// #     let fix = PlanarFix::new([PointFix {
-    /// #         position_w: Vector2::new(0.5, -0.2),
-    /// #         covariance_w: Matrix2::identity() * variance,
-    /// #         lever_arm_b: Vector2::zeros(),
-    /// #         scale_error: 0.0,
-    /// #     }]);
-    /// #     let mut corrected = then;
-    /// #     update(&mut corrected, &fix, &UpdateOptions::PLAIN).map(|_| corrected)
-    /// # };
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+    /// let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
     /// // Nothing was changed, so nothing is carried on.
     /// let late = LateCorrection::between(&then, &then);
     /// let carried = late.carried(&Drift::none(), &now).expect("nothing was taken away");
@@ -124,17 +111,18 @@ impl<G: LieGroup<D>, S: LateSide, const D: usize> LateCorrection<G, S, D> {
     /// `None` where less than [`LEAST_SHARE`] of a variance remains, so that the subtraction would lose digits: replay.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, Left, UpdateOptions, propagate_odometry, update};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{OdometryStep, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-    /// use inekf::filter::LateCorrection;
-    /// use inekf::model::Drift;
+    /// # use inekf::filter::{UpdateOptions, update};
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, LateCorrection, Left, propagate_odometry};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Drift, OdometryStep};
+    /// use nalgebra::{Matrix3, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
-    /// # let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+    /// let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
     /// # let corrected_by = |variance: f64| {
     /// #     let fix = PlanarFix::new([PointFix {
     /// #         position_w: Vector2::new(0.5, -0.2),
@@ -162,17 +150,18 @@ impl<G: LieGroup<D>, S: LateSide, const D: usize> LateCorrection<G, S, D> {
     /// [`carried`](Self::carried) in any case, with the least share of a variance that remains.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, Left, UpdateOptions, propagate_odometry, update};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{OdometryStep, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-    /// use inekf::filter::LateCorrection;
-    /// use inekf::model::Drift;
+    /// # use inekf::filter::{UpdateOptions, update};
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, LateCorrection, Left, propagate_odometry};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Drift, OdometryStep};
+    /// use nalgebra::{Matrix3, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
-    /// # let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+    /// let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
     /// # let corrected_by = |variance: f64| {
     /// #     let fix = PlanarFix::new([PointFix {
     /// #         position_w: Vector2::new(0.5, -0.2),
@@ -244,17 +233,15 @@ pub trait LateSide: Side {
     /// What the covariance lost from `before` to `after` a measurement, in coordinates around the mean before.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, UpdateOptions, propagate_odometry, update};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{OdometryStep, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, Matrix3, Vector2};
-    /// use inekf::filter::{LateSide, Left};
+    /// # use inekf::filter::{UpdateOptions, update};
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, LateSide, Left};
+    /// use inekf::lie::{LieGroup, SE2};
     /// use nalgebra::Vector3;
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
-    /// # let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
     /// # let corrected_by = |variance: f64| {
     /// #     let fix = PlanarFix::new([PointFix {
     /// #         position_w: Vector2::new(0.5, -0.2),
@@ -282,17 +269,16 @@ pub trait LateSide: Side {
     /// motion `body`, and the least share of a variance that this is.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, UpdateOptions, propagate_odometry, update};
-    /// # use inekf::model::{OdometryStep, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-    /// use inekf::filter::{LateSide, Left};
+    /// # use inekf::filter::{UpdateOptions, update};
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, LateSide, Left};
     /// use inekf::lie::{LieGroup, SE2};
     /// use inekf::model::Drift;
+    /// use nalgebra::Vector3;
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
-    /// # let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
     /// # let corrected_by = |variance: f64| {
     /// #     let fix = PlanarFix::new([PointFix {
     /// #         position_w: Vector2::new(0.5, -0.2),
@@ -327,26 +313,15 @@ pub trait LateSide: Side {
     /// The belief at `mean` whose covariance is `remaining` in coordinates around the mean of `now`.
     ///
     /// ```
-    /// # use inekf::filter::{Belief, Covariance, UpdateOptions, propagate_odometry, update};
-    /// # use inekf::lie::{LieGroup, SE2};
-    /// # use inekf::model::{OdometryStep, PlanarFix, PointFix};
-    /// # use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-    /// use inekf::filter::{LateSide, Left};
+    /// use inekf::filter::{Belief, Covariance, LateSide, Left, propagate_odometry};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use nalgebra::{Matrix3, Vector3};
     ///
-    /// # let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
-    /// # let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
-    /// # let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
-    /// # let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
-    /// # let corrected_by = |variance: f64| {
-    /// #     let fix = PlanarFix::new([PointFix {
-    /// #         position_w: Vector2::new(0.5, -0.2),
-    /// #         covariance_w: Matrix2::identity() * variance,
-    /// #         lever_arm_b: Vector2::zeros(),
-    /// #         scale_error: 0.0,
-    /// #     }]);
-    /// #     let mut corrected = then;
-    /// #     update(&mut corrected, &fix, &UpdateOptions::PLAIN).map(|_| corrected)
-    /// # };
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+    /// let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
     /// // A left-invariant error is the same wherever the mean is.
     /// let moved = Left::recentred(&p, &then, now.mean);
     /// assert_eq!((moved.mean, moved.covariance), (now.mean, p));

@@ -19,5 +19,5 @@ pub use chain::{Chain, Link, Motion, Sighting};
 pub use deviation::{Deviation, deviation};
 pub use linearise::Jacobians;
 pub use preintegration::Preintegration;
-pub use solver::{Gain, Gaussian, LinearMeasurement, LinearMotion, SmootherError, Solver};
+pub use solver::{Gaussian, LinearMeasurement, LinearMotion, SmootherError, Solver};
 pub use window::{Fix, PriorForm, Window, WindowCorrection, WindowError, WindowOptions};

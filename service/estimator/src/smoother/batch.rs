@@ -31,35 +31,6 @@ use crate::model::Observation;
 /// let papers = BatchOptions { jacobians: Jacobians::Frozen, step_control: false, ..BatchOptions::default() };
 /// assert_eq!(papers.iterations, BatchOptions::default().iterations);
 /// ```
-///
-/// ```
-/// use inekf::filter::{Belief, Covariance, Left};
-/// use inekf::lie::{LieGroup, SE2};
-/// use inekf::model::{OdometryStep, PlanarFix, PointFix};
-/// use inekf::smoother::{Batch, BatchOptions, Chain};
-/// use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-///
-/// let seen = |x_m| PlanarFix::new([PointFix {
-///     position_w: Vector2::new(x_m, 0.0),
-///     covariance_w: Matrix2::identity(),
-///     lever_arm_b: Vector2::zeros(),
-///     scale_error: 0.0,
-/// }]);
-/// // A metre ahead without any noise; seen where it began, and where it ended two metres too far.
-/// let p = Covariance::from_variances(&Vector3::new(0.0, 1e6, 1e6));
-/// let mut chain = Chain::with_capacity(Belief::<SE2, Left, 3>::new(SE2::identity(), p), 2, 2);
-/// chain.observe(seen(0.0));
-/// chain.advance(OdometryStep::new(&Vector3::new(0.0, 1.0, 0.0), 1.0), Matrix3::zeros());
-/// chain.observe(seen(3.0));
-/// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 2);
-/// batch.dead_reckon(&chain);
-/// assert!(batch.smooth(&chain, &BatchOptions::default())?.converged);
-/// // The difference is shared, and the motion holds exactly, although its covariance has no inverse.
-/// let [first, last] = batch.states() else { panic!("two states") };
-/// assert!((first.position.x - 1.0).abs() < 1e-3);
-/// assert!((last.position.x - first.position.x - 1.0).abs() < 1e-9);
-/// # Ok::<(), inekf::smoother::SmootherError>(())
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatchOptions {
     /// Most Gauss-Newton iterations.
@@ -217,6 +188,35 @@ const MAX_TRIALS: usize = 11;
 /// A trajectory, and the room to smooth it in.
 ///
 /// G is the group, S the parametrisation, D the dimension of the group, M that of an observation.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{OdometryStep, PlanarFix, PointFix};
+/// use inekf::smoother::{Batch, BatchOptions, Chain};
+/// use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+///
+/// let seen = |x_m| PlanarFix::new([PointFix {
+///     position_w: Vector2::new(x_m, 0.0),
+///     covariance_w: Matrix2::identity(),
+///     lever_arm_b: Vector2::zeros(),
+///     scale_error: 0.0,
+/// }]);
+/// // A metre ahead without any noise; seen where it began, and where it ended two metres too far.
+/// let p = Covariance::from_variances(&Vector3::new(0.0, 1e6, 1e6));
+/// let mut chain = Chain::with_capacity(Belief::<SE2, Left, 3>::new(SE2::identity(), p), 2, 2);
+/// chain.observe(seen(0.0));
+/// chain.advance(OdometryStep::new(&Vector3::new(0.0, 1.0, 0.0), 1.0), Matrix3::zeros());
+/// chain.observe(seen(3.0));
+/// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 2);
+/// batch.dead_reckon(&chain);
+/// assert!(batch.smooth(&chain, &BatchOptions::default())?.converged);
+/// // The difference is shared, and the motion holds exactly, although its covariance has no inverse.
+/// let [first, last] = batch.states() else { panic!("two states") };
+/// assert!((first.position.x - 1.0).abs() < 1e-3);
+/// assert!((last.position.x - first.position.x - 1.0).abs() < 1e-9);
+/// # Ok::<(), inekf::smoother::SmootherError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Batch<G, S, const D: usize, const M: usize> {
     states: Vec<G>,

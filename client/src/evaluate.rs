@@ -56,6 +56,14 @@ pub struct Pose {
 
 impl Pose {
     /// Heading of the body x axis, rad, counter-clockwise from the world x axis.
+    ///
+    /// ```
+    /// use inekf_client::evaluate::estimate_pose;
+    /// use inekf_client::table::EstimateState;
+    ///
+    /// let pose = estimate_pose(0, &EstimateState::Plane { theta_rad: 2.0, p_w_m: [0.0; 2] });
+    /// assert!((pose.heading_rad() - 2.0).abs() < 1e-12);
+    /// ```
     pub fn heading_rad(&self) -> f64 {
         heading_rad(&self.q_wb)
     }
@@ -109,6 +117,15 @@ pub struct Trajectory {
 
 impl Trajectory {
     /// Makes a trajectory; poses are sorted, and of poses with one stamp the first is kept.
+    ///
+    /// ```
+    /// use inekf_client::evaluate::{Trajectory, estimate_pose};
+    /// use inekf_client::table::EstimateState;
+    ///
+    /// let level = |x_m| EstimateState::Pose { q_wb: [0.0, 0.0, 0.0, 1.0], p_w_m: [x_m, 0.0, 0.0] };
+    /// let way = Trajectory::new(vec![estimate_pose(20, &level(2.0)), estimate_pose(10, &level(1.0))]);
+    /// assert_eq!(way.poses()[0].stamp_ns, 10);
+    /// ```
     pub fn new(mut poses: Vec<Pose>) -> Self {
         poses.sort_by_key(|pose| pose.stamp_ns);
         poses.dedup_by_key(|pose| pose.stamp_ns);
@@ -194,6 +211,12 @@ impl Trajectory {
     }
 
     /// The poses, by stamp.
+    ///
+    /// ```
+    /// use inekf_client::evaluate::Trajectory;
+    ///
+    /// assert!(Trajectory::default().poses().is_empty());
+    /// ```
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }

@@ -132,6 +132,16 @@ pub struct LocalFrame {
 
 impl LocalFrame {
     /// The frame with this origin.
+    ///
+    /// ```
+    /// use inekf_client::geodetic::{Geodetic, LocalFrame};
+    ///
+    /// // A minute of latitude to the north is a nautical mile, or nearly.
+    /// let origin = Geodetic { lat_deg: 45.0, lon_deg: 13.0, alt_m: 0.0 };
+    /// let frame = LocalFrame::new(origin);
+    /// let [_, north, _] = frame.enu_m(Geodetic { lat_deg: 45.0 + 1.0 / 60.0, ..origin });
+    /// assert!((north - 1852.0).abs() < 5.0);
+    /// ```
     #[must_use]
     pub fn new(origin: Geodetic) -> Self {
         let (sin_lat, cos_lat) = origin.lat_deg.to_radians().sin_cos();
@@ -154,6 +164,13 @@ impl LocalFrame {
     }
 
     /// Where the frame has its zero.
+    ///
+    /// ```
+    /// use inekf_client::geodetic::{Geodetic, LocalFrame};
+    ///
+    /// let origin = Geodetic { lat_deg: 52.0, lon_deg: 13.0, alt_m: 40.0 };
+    /// assert_eq!(LocalFrame::new(origin).origin(), origin);
+    /// ```
     #[must_use]
     pub fn origin(&self) -> Geodetic {
         self.origin

@@ -55,6 +55,13 @@ impl Model {
     }
 
     /// The `MODEL_*` code.
+    ///
+    /// ```
+    /// use inekf_client::model::Model;
+    /// use inekf_shared::message::MODEL_ODOMETRY_2D;
+    ///
+    /// assert_eq!(Model::Odometry2d.code(), MODEL_ODOMETRY_2D);
+    /// ```
     pub fn code(self) -> u32 {
         match self {
             Self::Imu => MODEL_IMU,
@@ -108,9 +115,27 @@ pub trait Estimate: EstimateMessage {
     const LAYOUT: Layout;
 
     /// The mean.
+    ///
+    /// ```
+    /// use inekf_client::model::Estimate;
+    /// use inekf_client::table::EstimateState;
+    /// use inekf_shared::message::{EstimateSe2, Zero};
+    ///
+    /// let mut estimate = EstimateSe2::ZERO;
+    /// estimate.theta_rad = 0.5;
+    /// assert_eq!(estimate.mean(), EstimateState::Plane { theta_rad: 0.5, p_w_m: [0.0; 2] });
+    /// ```
     fn mean(&self) -> EstimateState;
 
     /// The whole array of the covariance: the upper triangle, row by row, then zeros if the dimension is smaller.
+    ///
+    /// ```
+    /// use inekf_client::model::Estimate;
+    /// use inekf_shared::message::{EstimateSe2, Zero};
+    ///
+    /// // The upper triangle of 3 x 3.
+    /// assert_eq!(EstimateSe2::ZERO.covariance().len(), 6);
+    /// ```
     fn covariance(&self) -> &[f64];
 }
 

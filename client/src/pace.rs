@@ -67,6 +67,15 @@ pub struct Pace {
 
 impl Pace {
     /// A pace at which the stamp `first_ns` is now.
+    ///
+    /// ```
+    /// use inekf_client::pace::Pace;
+    /// use std::time::Instant;
+    ///
+    /// // What begins now is due now.
+    /// let pace = Pace::new(5_000_000_000, 1.0);
+    /// assert!(pace.deadline(5_000_000_000) <= Instant::now());
+    /// ```
     pub fn new(first_ns: u64, times: f64) -> Self {
         Self {
             start: Instant::now(),

@@ -53,6 +53,21 @@ impl<E> Default for RowBuilder<E> {
 
 impl<E: Estimate> RowBuilder<E> {
     /// Takes the next estimate; returns the row that it completes.
+    ///
+    /// ```
+    /// use inekf_client::rows::RowBuilder;
+    /// use inekf_shared::message::{ESTIMATE_PROPAGATED, EstimateSe2, Zero};
+    ///
+    /// let estimate = |stamp_ns| {
+    ///     let mut estimate = EstimateSe2::ZERO;
+    ///     (estimate.head.stamp_ns, estimate.head.flags) = (stamp_ns, ESTIMATE_PROPAGATED);
+    ///     estimate
+    /// };
+    /// let mut rows = RowBuilder::default();
+    /// assert!(rows.push(estimate(10)).is_none());
+    /// // The next stamp completes the row of the one before.
+    /// assert_eq!(rows.push(estimate(20)), Some(estimate(10)));
+    /// ```
     pub fn push(&mut self, estimate: E) -> Option<E> {
         let head = *estimate.head();
         if let Some(current) = &mut self.current
@@ -68,6 +83,14 @@ impl<E: Estimate> RowBuilder<E> {
     }
 
     /// The last row.
+    ///
+    /// ```
+    /// use inekf_client::rows::RowBuilder;
+    /// use inekf_shared::message::EstimateSe2;
+    ///
+    /// // Nothing came: there is no row.
+    /// assert!(RowBuilder::<EstimateSe2>::default().finish().is_none());
+    /// ```
     pub fn finish(self) -> Option<E> {
         self.current
     }

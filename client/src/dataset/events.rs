@@ -38,6 +38,13 @@ pub enum Event {
 
 impl Event {
     /// The row's stamp, ns.
+    ///
+    /// ```
+    /// use inekf_client::dataset::{Event, HeadingRow};
+    ///
+    /// let fix = HeadingRow { stamp_ns: 5, source: 0, heading_rad: 0.3, sigma_rad: 0.1 };
+    /// assert_eq!(Event::Heading(fix).stamp_ns(), 5);
+    /// ```
     pub fn stamp_ns(&self) -> u64 {
         match self {
             Self::Position(row) => row.stamp_ns,

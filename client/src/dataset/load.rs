@@ -70,6 +70,19 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError::Folder`] if there is no such folder, [`DatasetError::File`] if a file cannot
     /// be opened, [`DatasetError::Faults`] with every fault of every file.
+    ///
+    /// ```
+    /// use inekf_client::dataset::{Dataset, LoadOptions};
+    ///
+    /// let folder = tempfile::tempdir()?;
+    /// std::fs::write(folder.path().join("meta.json"), r#"{"name": "bench"}"#)?;
+    /// std::fs::write(folder.path().join("imu.csv"), "t_ns,gx,gy,gz,ax,ay,az\n10,0,0,0.1,0,0,9.81\n")?;
+    /// // A file that is named has to exist.
+    /// let options = LoadOptions { position_file: "rtk.csv".to_owned(), ..LoadOptions::default() };
+    /// let error = Dataset::load_with(folder.path(), &options).expect_err("no rtk.csv");
+    /// assert!(error.to_string().contains("rtk.csv"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn load_with(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Self, DatasetError> {
         let dir = dir.as_ref();
         fs::read_dir(dir).map_err(|cause| DatasetError::Folder {

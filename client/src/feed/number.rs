@@ -60,6 +60,16 @@ pub struct Numbering {
 
 impl Numbering {
     /// A new life of a sender; `epoch` tells it from its earlier lives (its start time will do).
+    ///
+    /// ```
+    /// use inekf_client::dataset::ImuRow;
+    /// use inekf_client::feed::Numbering;
+    ///
+    /// // A sender that was started again counts from 0, in another life.
+    /// let row = ImuRow { stamp_ns: 5, gyro_rps: [0.0; 3], accel_mps2: [0.0, 0.0, 9.81] };
+    /// let sent = Numbering::new(7).imu(&row, 0);
+    /// assert_eq!((sent.header.epoch, sent.header.seq), (7, 0));
+    /// ```
     pub fn new(epoch: u64) -> Self {
         Self {
             epoch,
@@ -89,6 +99,17 @@ impl Numbering {
     }
 
     /// The message for an IMU sample.
+    ///
+    /// ```
+    /// use inekf_client::dataset::ImuRow;
+    /// use inekf_client::feed::Numbering;
+    ///
+    /// let row = ImuRow { stamp_ns: 5, gyro_rps: [0.1, 0.0, 0.0], accel_mps2: [0.0, 0.0, 9.81] };
+    /// let sample = Numbering::new(1).imu(&row, 12);
+    /// // When it was measured, and when it was sent: two clocks.
+    /// assert_eq!((sample.header.stamp_ns, sample.header.sent_ns), (5, 12));
+    /// assert_eq!(sample.accel_mps2, row.accel_mps2);
+    /// ```
     pub fn imu(&mut self, row: &ImuRow, sent_ns: u64) -> ImuSample {
         ImuSample {
             header: self.header(INPUT_IMU, row.stamp_ns, sent_ns),
@@ -98,6 +119,15 @@ impl Numbering {
     }
 
     /// The message for a planar odometry increment.
+    ///
+    /// ```
+    /// use inekf_client::dataset::Odometry2dRow;
+    /// use inekf_client::feed::Numbering;
+    ///
+    /// let row = Odometry2dRow { stamp_ns: 5, dtheta_rad: 0.1, translation_m: [1.0, 0.0] };
+    /// let increment = Numbering::new(1).odometry2d(&row, 0);
+    /// assert_eq!((increment.dtheta_rad, increment.translation_m), (0.1, [1.0, 0.0]));
+    /// ```
     pub fn odometry2d(&mut self, row: &Odometry2dRow, sent_ns: u64) -> Odometry2d {
         Odometry2d {
             header: self.header(INPUT_ODOMETRY_2D, row.stamp_ns, sent_ns),
@@ -107,6 +137,15 @@ impl Numbering {
     }
 
     /// The message for a spatial odometry increment.
+    ///
+    /// ```
+    /// use inekf_client::dataset::Odometry3dRow;
+    /// use inekf_client::feed::Numbering;
+    ///
+    /// let row = Odometry3dRow { stamp_ns: 5, rotation_rad: [0.0, 0.0, 0.1], translation_m: [1.0, 0.0, 0.0] };
+    /// let increment = Numbering::new(1).odometry3d(&row, 0);
+    /// assert_eq!((increment.rotation_rad, increment.translation_m), (row.rotation_rad, row.translation_m));
+    /// ```
     pub fn odometry3d(&mut self, row: &Odometry3dRow, sent_ns: u64) -> Odometry3d {
         Odometry3d {
             header: self.header(INPUT_ODOMETRY_3D, row.stamp_ns, sent_ns),
@@ -116,6 +155,16 @@ impl Numbering {
     }
 
     /// The message for a position fix.
+    ///
+    /// ```
+    /// use inekf_client::dataset::PositionRow;
+    /// use inekf_client::feed::Numbering;
+    ///
+    /// let row = PositionRow { stamp_ns: 5, source: 1, dimension: 3, position_w_m: [1.0, 2.0, 3.0], sigma_m: [0.5, 0.5, 1.0] };
+    /// // A row has standard deviations, a message the covariance, row by row.
+    /// let fix = Numbering::new(1).position(&row, 0);
+    /// assert_eq!(fix.covariance_w_m2, [0.25, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 1.0]);
+    /// ```
     pub fn position(&mut self, row: &PositionRow, sent_ns: u64) -> PositionFix {
         PositionFix {
             header: self.header(INPUT_POSITION, row.stamp_ns, sent_ns),
@@ -127,6 +176,15 @@ impl Numbering {
     }
 
     /// The message for a velocity fix.
+    ///
+    /// ```
+    /// use inekf_client::dataset::VelocityRow;
+    /// use inekf_client::feed::Numbering;
+    ///
+    /// let row = VelocityRow { stamp_ns: 5, source: 0, velocity_w_mps: [3.0, 0.0, 0.0], sigma_mps: [0.5; 3] };
+    /// let fix = Numbering::new(1).velocity(&row, 0);
+    /// assert_eq!((fix.velocity_w_mps, fix.covariance_w[0]), ([3.0, 0.0, 0.0], 0.25));
+    /// ```
     pub fn velocity(&mut self, row: &VelocityRow, sent_ns: u64) -> VelocityFix {
         VelocityFix {
             header: self.header(INPUT_VELOCITY, row.stamp_ns, sent_ns),
@@ -138,6 +196,15 @@ impl Numbering {
     }
 
     /// The message for a heading fix.
+    ///
+    /// ```
+    /// use inekf_client::dataset::HeadingRow;
+    /// use inekf_client::feed::Numbering;
+    ///
+    /// let row = HeadingRow { stamp_ns: 5, source: 0, heading_rad: 0.3, sigma_rad: 0.1 };
+    /// let fix = Numbering::new(1).heading(&row, 0);
+    /// assert_eq!((fix.heading_rad, fix.sigma_rad), (0.3, 0.1));
+    /// ```
     pub fn heading(&mut self, row: &HeadingRow, sent_ns: u64) -> HeadingFix {
         HeadingFix {
             header: self.header(INPUT_HEADING, row.stamp_ns, sent_ns),

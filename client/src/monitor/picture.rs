@@ -89,6 +89,15 @@ impl Picture {
     ///
     /// # Errors
     /// None: the histogram's bounds are allowed.
+    ///
+    /// ```
+    /// use inekf_client::model::Model;
+    /// use inekf_client::monitor::Picture;
+    ///
+    /// let picture = Picture::new("car", Model::Imu)?;
+    /// assert!(picture.head.is_none() && picture.latency.is_empty());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(instance: &str, model: Model) -> Result<Self, CreationError> {
         Ok(Self {
             instance: instance.to_owned(),

@@ -173,11 +173,55 @@ impl<R: Read> Reader<R> {
     }
 
     /// What the recording begins with.
+    ///
+    /// ```
+    /// # use inekf_client::recording::{Head, RECORDING_VERSION};
+    /// # use inekf_shared::message::MODEL_IMU;
+    /// use inekf_client::recording::{Reader, Writer};
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_IMU,
+    /// #     instance: "car".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("drive.rec");
+    /// let mut writer = Writer::create(&path, &head)?;
+    /// writer.finish()?;
+    /// assert_eq!(Reader::open(&path)?.head().instance, "car");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn head(&self) -> &Head {
         &self.head
     }
 
     /// What could not be read so far.
+    ///
+    /// ```
+    /// # use inekf_client::recording::{Head, RECORDING_VERSION};
+    /// # use inekf_shared::message::MODEL_IMU;
+    /// use inekf_client::recording::{Reader, Writer};
+    /// use inekf_client::recording::read::Damage;
+    /// use inekf_shared::message::EstimateSe23;
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_IMU,
+    /// #     instance: "car".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("drive.rec");
+    /// let mut writer = Writer::create(&path, &head)?;
+    /// writer.finish()?;
+    /// let mut reader = Reader::open(&path)?;
+    /// while reader.next_item::<EstimateSe23>()?.is_some() {}
+    /// assert_eq!(reader.damage(), Damage::default());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn damage(&self) -> Damage {
         self.damage
     }

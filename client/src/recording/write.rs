@@ -107,6 +107,29 @@ impl Writer {
     ///
     /// # Errors
     /// It cannot be encoded.
+    ///
+    /// ```
+    /// # use inekf_client::recording::{Head, RECORDING_VERSION};
+    /// # use inekf_shared::message::MODEL_IMU;
+    /// use inekf_client::recording::{Item, Reader, Writer};
+    /// use inekf_shared::message::{EstimateSe23, JournalEntry, Zero};
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_IMU,
+    /// #     instance: "car".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("drive.rec");
+    /// let mut writer = Writer::create(&path, &head)?;
+    /// writer.entry(&JournalEntry::ZERO)?;
+    /// writer.finish()?;
+    /// let mut reader = Reader::open(&path)?;
+    /// assert!(matches!(reader.next_item::<EstimateSe23>()?, Some(Item::Entry(_))));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn entry(&mut self, entry: &JournalEntry) -> io::Result<()> {
         self.append(FRAME_ENTRY, &Entry::of(entry))
     }
@@ -115,6 +138,31 @@ impl Writer {
     ///
     /// # Errors
     /// It cannot be encoded.
+    ///
+    /// ```
+    /// # use inekf_client::recording::{Head, RECORDING_VERSION};
+    /// # use inekf_shared::message::MODEL_IMU;
+    /// use inekf_client::recording::{Item, Reader, Writer};
+    /// use inekf_shared::message::{EstimateSe23, Zero};
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_IMU,
+    /// #     instance: "car".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("drive.rec");
+    /// let mut writer = Writer::create(&path, &head)?;
+    /// let mut estimate = EstimateSe23::ZERO;
+    /// estimate.head.stamp_ns = 5;
+    /// writer.estimate(&estimate)?;
+    /// writer.finish()?;
+    /// let Some(Item::Estimate(read)) = Reader::open(&path)?.next_item::<EstimateSe23>()? else { panic!("an estimate") };
+    /// assert_eq!(read, estimate);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn estimate<E: EstimateMessage>(&mut self, estimate: &E) -> io::Result<()> {
         self.append(FRAME_ESTIMATE, estimate)
     }
@@ -123,6 +171,30 @@ impl Writer {
     ///
     /// # Errors
     /// As the system says; what was gathered is kept, and the file ends with a whole frame.
+    ///
+    /// ```
+    /// # use inekf_client::recording::{Head, RECORDING_VERSION};
+    /// # use inekf_shared::message::MODEL_IMU;
+    /// use inekf_client::recording::Writer;
+    /// use inekf_shared::message::{EstimateSe23, Zero};
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_IMU,
+    /// #     instance: "car".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("drive.rec");
+    /// let mut writer = Writer::create(&path, &head)?;
+    /// writer.estimate(&EstimateSe23::ZERO)?;
+    /// // Gathered until then: many frames are one write.
+    /// let before = std::fs::metadata(&path)?.len();
+    /// writer.flush()?;
+    /// assert!(std::fs::metadata(&path)?.len() > before);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn flush(&mut self) -> io::Result<()> {
         let written = self.file.write_all(&self.gathered);
         self.fails = written.is_err();
@@ -140,6 +212,29 @@ impl Writer {
     }
 
     /// Frames that were given up because the disk refused for too long.
+    ///
+    /// ```
+    /// # use inekf_client::recording::{Head, RECORDING_VERSION};
+    /// # use inekf_shared::message::MODEL_IMU;
+    /// use inekf_client::recording::Writer;
+    /// use inekf_shared::message::{EstimateSe23, Zero};
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_IMU,
+    /// #     instance: "car".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("drive.rec");
+    /// let mut writer = Writer::create(&path, &head)?;
+    /// // A disk that takes everything costs nothing.
+    /// writer.estimate(&EstimateSe23::ZERO)?;
+    /// writer.flush()?;
+    /// assert_eq!(writer.given_up(), 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn given_up(&self) -> u64 {
         self.given_up
     }
@@ -148,6 +243,28 @@ impl Writer {
     ///
     /// # Errors
     /// As the system says.
+    ///
+    /// ```
+    /// # use inekf_client::recording::{Head, RECORDING_VERSION};
+    /// # use inekf_shared::message::MODEL_IMU;
+    /// use inekf_client::recording::{Reader, Writer};
+    /// use inekf_shared::message::EstimateSe23;
+    ///
+    /// # let head = Head {
+    /// #     version: RECORDING_VERSION,
+    /// #     model: MODEL_IMU,
+    /// #     instance: "car".to_owned(),
+    /// #     began_unix_s: 0,
+    /// #     config: String::new(),
+    /// # };
+    /// let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("drive.rec");
+    /// let mut writer = Writer::create(&path, &head)?;
+    /// writer.finish()?;
+    /// // A recording of nothing is one.
+    /// assert!(Reader::open(&path)?.next_item::<EstimateSe23>()?.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn finish(mut self) -> io::Result<()> {
         self.flush()?;
         self.file.sync_all()

@@ -42,6 +42,12 @@ impl Jet {
     }
 
     /// A constant.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Jet;
+    ///
+    /// assert_eq!(Jet::constant(5.0), Jet { value: 5.0, rate: 0.0, second: 0.0 });
+    /// ```
     pub fn constant(value: f64) -> Self {
         Self {
             value,

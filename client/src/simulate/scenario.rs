@@ -64,6 +64,12 @@ impl Scenario {
     pub const ALL: [Self; 3] = [Self::RoadCircuit, Self::DroneLoops, Self::StandThenDrive];
 
     /// The name on the command line.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Scenario;
+    ///
+    /// assert_eq!(Scenario::RoadCircuit.name(), "road-circuit");
+    /// ```
     pub fn name(self) -> &'static str {
         match self {
             Self::RoadCircuit => "road-circuit",
@@ -73,6 +79,13 @@ impl Scenario {
     }
 
     /// One line for the help text.
+    ///
+    /// ```
+    /// use inekf_client::simulate::Scenario;
+    ///
+    /// // One line each.
+    /// assert!(Scenario::ALL.iter().all(|scenario| scenario.description().lines().count() == 1));
+    /// ```
     pub fn description(self) -> &'static str {
         match self {
             Self::RoadCircuit => {

@@ -113,6 +113,12 @@ pub enum EstimateState {
 
 impl EstimateState {
     /// The layout this state is written in.
+    ///
+    /// ```
+    /// use inekf_client::table::{EstimateState, Layout};
+    ///
+    /// assert_eq!(EstimateState::Plane { theta_rad: 0.0, p_w_m: [0.0; 2] }.layout(), Layout::Plane);
+    /// ```
     pub fn layout(&self) -> Layout {
         match self {
             Self::Navigation { .. } => Layout::Navigation,
@@ -183,6 +189,15 @@ impl<W: Write> EstimateWriter<W> {
     ///
     /// # Errors
     /// What the writer reports.
+    ///
+    /// ```
+    /// use inekf_client::table::{EstimateWriter, Layout};
+    ///
+    /// // The header is written at once: an estimate that never came leaves a table without rows.
+    /// let writer = EstimateWriter::new(Vec::new(), Layout::Plane, None)?;
+    /// assert_eq!(writer.finish()?, b"t_ns,theta,x,y\n");
+    /// # Ok::<(), std::io::Error>(())
+    /// ```
     pub fn new(
         mut out: W,
         layout: Layout,
@@ -267,6 +282,15 @@ impl<W: Write> EstimateWriter<W> {
     ///
     /// # Errors
     /// What the writer reports.
+    ///
+    /// ```
+    /// use inekf_client::table::{EstimateState, EstimateWriter, Layout};
+    ///
+    /// let mut writer = EstimateWriter::new(Vec::new(), Layout::Plane, None)?;
+    /// writer.write(5, &EstimateState::Plane { theta_rad: 0.5, p_w_m: [1.0, 2.0] }, &[])?;
+    /// assert_eq!(String::from_utf8(writer.finish()?)?.lines().count(), 2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn finish(mut self) -> io::Result<W> {
         self.out.flush()?;
         Ok(self.out)

@@ -51,6 +51,13 @@ impl Fault {
     }
 
     /// The same fault, with a column or key.
+    ///
+    /// ```
+    /// use inekf_client::table::Fault;
+    ///
+    /// let fault = Fault::in_file("meta.json", "it is a list", "write a name").at_column("name");
+    /// assert_eq!(fault.to_string(), "meta.json name: it is a list; write a name");
+    /// ```
     #[must_use]
     pub fn at_column(mut self, column: &str) -> Self {
         self.column = Some(column.to_owned());
@@ -58,6 +65,13 @@ impl Fault {
     }
 
     /// The same fault, with a line.
+    ///
+    /// ```
+    /// use inekf_client::table::Fault;
+    ///
+    /// let fault = Fault::in_file("imu.csv", "it has 3 fields", "write 7").at_line(12);
+    /// assert_eq!(fault.to_string(), "imu.csv line 12: it has 3 fields; write 7");
+    /// ```
     #[must_use]
     pub fn at_line(mut self, line: u64) -> Self {
         self.line = Some(line);
@@ -101,26 +115,64 @@ pub struct Faults {
 
 impl Faults {
     /// No faults yet.
+    ///
+    /// ```
+    /// use inekf_client::table::Faults;
+    ///
+    /// assert_eq!(Faults::new().len(), 0);
+    /// ```
     pub fn new() -> Self {
         Self::default()
     }
 
     /// Adds one.
+    ///
+    /// ```
+    /// use inekf_client::table::{Fault, Faults};
+    ///
+    /// let mut faults = Faults::new();
+    /// faults.push(Fault::in_file("imu.csv", "it is empty", "add rows"));
+    /// assert_eq!(faults.to_string(), "imu.csv: it is empty; add rows");
+    /// ```
     pub fn push(&mut self, fault: Fault) {
         self.list.push(fault);
     }
 
     /// Every fault, in the order found.
+    ///
+    /// ```
+    /// use inekf_client::table::{Fault, Faults};
+    ///
+    /// let mut faults = Faults::new();
+    /// faults.push(Fault::in_file("imu.csv", "it is empty", "add rows"));
+    /// faults.push(Fault::in_file("truth.csv", "it is empty", "add rows"));
+    /// let files: Vec<&str> = faults.list().iter().map(|fault| fault.file.as_str()).collect();
+    /// assert_eq!(files, ["imu.csv", "truth.csv"]);
+    /// ```
     pub fn list(&self) -> &[Fault] {
         &self.list
     }
 
     /// How many faults there are.
+    ///
+    /// ```
+    /// use inekf_client::table::{Fault, Faults};
+    ///
+    /// let mut faults = Faults::new();
+    /// faults.push(Fault::in_file("imu.csv", "it is empty", "add rows"));
+    /// assert_eq!(faults.len(), 1);
+    /// ```
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
     /// Whether nothing is wrong.
+    ///
+    /// ```
+    /// use inekf_client::table::Faults;
+    ///
+    /// assert!(Faults::new().is_empty());
+    /// ```
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }

@@ -9,6 +9,33 @@
 //! - [`filter`]: beliefs on groups, propagation, the one update core of every filter, gating, initialisation;
 //! - [`smoother`]: whole trajectories by Gauss-Newton, exact where noise vanishes.
 //!
+//! # In short
+//!
+//! ```
+//! use inekf::filter::{Belief, Covariance, Left, UpdateOptions, propagate, update};
+//! use inekf::lie::{LieGroup, SE23};
+//! use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+//! use nalgebra::{Matrix3, SVector, Vector3};
+//!
+//! let p = Covariance::from_variances(&SVector::repeat(0.1));
+//! let mut belief = Belief::<SE23, Left, 9>::new(SE23::identity(), p);
+//! // A sample of the IMU: at rest it feels what holds it up.
+//! let sample = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+//! let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+//! let g_w = Vector3::new(0.0, 0.0, -9.80665);
+//! belief = propagate(&belief, &sample, &g_w, 0.005, Discretisation::ZeroOrderHold, &noise);
+//! // A fix of the antenna, 1.5 m above it.
+//! let fix = PositionObservation {
+//!     position_w: Vector3::new(0.2, 0.0, 1.5),
+//!     covariance_w: Matrix3::identity() * 0.01,
+//!     lever_arm_b: Vector3::new(0.0, 0.0, 1.5),
+//! };
+//! let before = belief.covariance.matrix()[(6, 6)];
+//! update(&mut belief, &fix, &UpdateOptions::ITERATED)?;
+//! assert!(belief.mean.position.x > 0.0 && belief.covariance.matrix()[(6, 6)] < before);
+//! # Ok::<(), inekf::filter::UpdateError>(())
+//! ```
+//!
 //! # Conventions
 //!
 //! | what | convention |

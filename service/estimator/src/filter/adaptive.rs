@@ -66,6 +66,32 @@ pub struct Adaptive<G, const B: usize, const P: usize, const D: usize, const S: 
 }
 
 /// What an observation did to a bank.
+///
+/// ```
+/// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
+/// # use nalgebra::{Matrix2, Vector2};
+/// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Gate, Left, UpdateOptions, Verdict, standard_modes};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::Vector3;
+///
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+/// let (modes, switching) = standard_modes(&[wheel], 0.1);
+/// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+/// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
+/// #     position_w: Vector2::new(x_m, 0.0),
+/// #     covariance_w: Matrix2::identity(),
+/// #     lever_arm_b: Vector2::zeros(),
+/// #     scale_error: 0.0,
+/// # }]));
+/// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+///
+/// // Two metres off where the variance of that is 1 + 1, in every mode.
+/// let weighed = bank.update_through(&fix_at(2.0), &Gate::OPEN)?;
+/// assert!(weighed.verdict == Verdict::Accepted && (weighed.nis - 2.0).abs() < 1e-9);
+/// # Ok::<(), inekf::filter::UpdateError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighed {
     /// Whether it was used.
@@ -104,6 +130,22 @@ where
 {
     /// The bank whose modes all start from `prior`, each with mismatches from its own prior. The gate of
     /// `options` is the bank's, see [`update`](Self::update).
+    ///
+    /// ```
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// // The scale is known as the modes expect it, each by its weight.
+    /// let variances = modes.iter().map(|mode| mode.entry_sigma[0].powi(2));
+    /// let expected: f64 = variances.zip(&switching.initial).map(|(variance, weight)| variance * weight).sum();
+    /// assert!((bank.estimate().covariance.matrix()[(3, 3)] - expected).abs() < 1e-12);
+    /// ```
     pub fn new(
         prior: &Belief<G, Left, B>,
         modes: [Mode<P>; S],
@@ -138,6 +180,23 @@ where
     /// modes differed is forgotten; measurements tell them apart again.
     ///
     /// The weights are not negative, and not all zero; they are made to add up to one.
+    ///
+    /// ```
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let known = bank.estimate();
+    /// let resumed = Adaptive::resumed(&known, [2.0; 9], modes, switching, UpdateOptions::PLAIN);
+    /// // The weights are made to add up to one; what was known is known.
+    /// assert!(resumed.weights().iter().all(|weight| (weight - 1.0 / 9.0).abs() < 1e-15));
+    /// assert!((resumed.estimate().covariance.matrix() - known.covariance.matrix()).norm() < 1e-12);
+    /// ```
     pub fn resumed(
         belief: &Belief<Augmented<G, B, P, D>, Left, D>,
         weights: [f64; S],
@@ -159,6 +218,26 @@ where
 
     /// Moves every mode by one step of odometry, seen with its own mismatches; `q` is the covariance of the
     /// step's noise, B x B, of the left-invariant error.
+    ///
+    /// ```
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{OdometryStep, ProcessMismatch, Unknowns};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let ahead = OdometryStep::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
+    /// bank.advance(&unknowns, &ahead, &Matrix3::zeros());
+    /// // Ten metres as it is seen; what is not known of the wheel joins what was not known of the place.
+    /// let estimate = bank.estimate();
+    /// assert!((estimate.mean.pose.position.x - 10.0).abs() < 1e-9);
+    /// assert!(estimate.covariance.matrix()[(1, 1)] > 1.1);
+    /// ```
     pub fn advance<const N: usize>(
         &mut self,
         unknowns: &Unknowns,
@@ -190,6 +269,32 @@ where
     /// # Errors
     /// [`UpdateError`] if a mode could not be corrected; the bank is then unchanged, as it is when the
     /// observation is gated.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, Verdict, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+    /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]));
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    ///
+    /// // A fix as good as what was known: half way.
+    /// assert_eq!(bank.update(&fix_at(0.5))?, Verdict::Accepted);
+    /// assert!((bank.estimate().mean.pose.position.x - 0.25).abs() < 1e-9);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     pub fn update<O, const M: usize>(&mut self, observation: &O) -> Result<Verdict, UpdateError>
     where
         O: Observation<Augmented<G, B, P, D>, D, M>,
@@ -202,6 +307,33 @@ where
     ///
     /// # Errors
     /// As [`update`](Self::update).
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix, ProcessMismatch, Unknowns};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Gate, Left, UpdateOptions, Verdict, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// # let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+    /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]));
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    ///
+    /// // A hundred metres off, which no mode explains.
+    /// let before = bank;
+    /// let weighed = bank.update_through(&fix_at(100.0), &Gate::of_probability(0.99))?;
+    /// assert_eq!((weighed.verdict, bank), (Verdict::Gated, before));
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     pub fn update_through<O, const M: usize>(
         &mut self,
         observation: &O,
@@ -246,6 +378,22 @@ where
     }
 
     /// The same bank with the covariance of every mode as `f` makes it.
+    ///
+    /// ```
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// // All standard deviations twice as large.
+    /// let wider = bank.with_covariances(|p| p.scaled(4.0));
+    /// assert_eq!(wider.weights(), bank.weights());
+    /// assert!((wider.estimate().covariance.matrix()[(1, 1)] - 4.0).abs() < 1e-9);
+    /// ```
     #[must_use]
     pub fn with_covariances(&self, f: impl Fn(&Covariance<D>) -> Covariance<D>) -> Self {
         let beliefs = self.beliefs.each_ref();
@@ -256,11 +404,68 @@ where
     }
 
     /// The weights of the modes, which add up to one.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{OdometryStep, ProcessMismatch, Unknowns};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+    /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]));
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let ahead = OdometryStep::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
+    /// bank.advance(&unknowns, &ahead, &Matrix3::zeros());
+    /// bank.update(&fix_at(20.0))?;
+    /// // Twice as far as the wheel says: "no mismatch at all" is refuted.
+    /// assert!(bank.weights()[0] < 1e-3);
+    /// assert!((bank.weights().iter().sum::<f64>() - 1.0).abs() < 1e-12);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     pub fn weights(&self) -> &[f64; S] {
         &self.weights
     }
 
     /// The estimate of pose and mismatches: the one Gaussian with the moments of the bank.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Adaptive, Belief, Covariance, Expected, Left, UpdateOptions, standard_modes};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{OdometryStep, ProcessMismatch, Unknowns};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let wheel = Expected { sigma: 0.03, burst_sigma: 0.2, of_motion: true };
+    /// let (modes, switching) = standard_modes(&[wheel], 0.1);
+    /// let unknowns = Unknowns::new::<2, 1>(&[ProcessMismatch::OdometryScale], &[]).expect("one");
+    /// # let fix_at = |x_m: f64| unknowns.observe(PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]));
+    /// let mut bank = Adaptive::<SE2, 3, 1, 4, 9>::new(&prior, modes, switching, UpdateOptions::PLAIN);
+    /// let ahead = OdometryStep::new(&Vector3::new(0.0, 10.0, 0.0), 1.0);
+    /// bank.advance(&unknowns, &ahead, &Matrix3::zeros());
+    /// bank.update(&fix_at(15.0))?;
+    /// // Farther than the wheel says: it is taken to show too little.
+    /// assert!(bank.estimate().mean.parameters[0] > 0.05);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     pub fn estimate(&self) -> Belief<Augmented<G, B, P, D>, Left, D> {
         merged(&self.weights, &self.beliefs).unwrap_or(self.beliefs[0])
     }

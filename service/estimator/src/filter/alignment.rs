@@ -135,6 +135,35 @@ pub struct Alignment {
 impl Alignment {
     /// The belief. Where the antenna is known rather than the IMU, position and attitude errors
     /// are correlated through the lever arm: `xi_p = -R^T n + [l]x xi_R`.
+    ///
+    /// ```
+    /// # use inekf::filter::{Alignment, BiasPrior};
+    /// # use inekf::lie::{LieGroup, SO3};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Left};
+    /// use inekf::model::NavState;
+    ///
+    /// # let alignment = Alignment {
+    /// #     r_wb: SO3::identity(),
+    /// #     tilt_sigma: 0.01,
+    /// #     heading_sigma: 0.5,
+    /// #     velocity_w: Vector3::zeros(),
+    /// #     velocity_sigma: 0.1,
+    /// #     position_w: Vector3::zeros(),
+    /// #     position_covariance_w: Matrix3::identity(),
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// #     biases: BiasPrior {
+    /// #         gyro_bias: Vector3::zeros(),
+    /// #         gyro_sigma: 0.001,
+    /// #         accel_bias: Vector3::zeros(),
+    /// #         accel_sigma: 0.05,
+    /// #     },
+    /// # };
+    /// // Level, the heading by 0.5 rad, the gyroscope's bias by 0.001 rad/s.
+    /// let belief: Belief<NavState, Left, 15> = alignment.belief();
+    /// let p = belief.covariance.matrix();
+    /// assert!((p[(2, 2)].sqrt() - 0.5).abs() < 1e-12 && (p[(9, 9)].sqrt() - 0.001).abs() < 1e-12);
+    /// ```
     pub fn belief<G: InertialState<D>, S: Side, const D: usize>(&self) -> Belief<G, S, D> {
         let r_wb = self.r_wb.matrix();
         let to_body = r_wb.transpose();

@@ -31,6 +31,19 @@ pub struct Belief<G, S, const D: usize> {
 
 impl<G: LieGroup<D>, S: Side, const D: usize> Belief<G, S, D> {
     /// The belief with this mean and this covariance of the error of side S.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left, Right};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// // Ten metres from the origin, with 0.1 rad of doubt about a rotation: of the body, or of everything about the origin.
+    /// let chi = SE2::exp(&Vector3::new(0.0, 10.0, 0.0));
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 0.0, 0.0));
+    /// let across = |p: Covariance<3>| p.matrix()[(2, 2)];
+    /// assert!(across(Belief::<SE2, Left, 3>::new(chi, p).left_covariance()).abs() < 1e-12);
+    /// assert!((across(Belief::<SE2, Right, 3>::new(chi, p).left_covariance()) - 1.0).abs() < 1e-12);
+    /// ```
     pub fn new(mean: G, covariance: Covariance<D>) -> Self {
         Self {
             mean,

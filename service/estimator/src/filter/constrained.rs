@@ -58,6 +58,35 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
     Constrained<'a, D, K, N, M>
 {
     /// The rule for an update of `belief` with `points`, after the motion of `process`.
+    ///
+    /// ```
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Constrained, Covariance, GainRule, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Declared, OutputMismatch, PlanarPair, ProcessColumns, ProcessMismatch};
+    /// use nalgebra::{SVector, Vector3, Vector4};
+    ///
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// let points = PlanarPair::new([fix(9.5), fix(20.0)]);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let mut belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// belief.mean.position.x = 10.0;
+    /// let process = ProcessColumns::<3, ProcessMismatch>::new(&[]).expect("none");
+    /// let noise = points.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &points, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let outputs = [Declared::hard(OutputMismatch::MeasurementScale { source: 1 })];
+    /// let rule = Constrained::new(&belief, &process, &outputs, &points);
+    /// // What a wrong scale of the second source adds at ten metres is not followed.
+    /// let gain = rule.gain(&belief.covariance, &linearised)?;
+    /// assert!((gain * Vector4::new(0.0, 0.0, 10.0, 0.0)).norm() < 1e-9);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     pub fn new<G: Pose<D, N>, S: Side>(
         belief: &Belief<G, S, D>,
         process: &ProcessColumns<D, impl MeanMismatch>,
@@ -132,6 +161,38 @@ impl<'a, const D: usize, const K: usize, const N: usize, const M: usize>
     ///
     /// # Errors
     /// [`UpdateError::TooManyConstraints`].
+    ///
+    /// ```
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Constrained, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Declared, OutputMismatch, PlanarPair, ProcessColumns, ProcessMismatch};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// let points = PlanarPair::new([fix(9.5), fix(20.0)]);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let mut belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// belief.mean.position.x = 10.0;
+    /// let process = ProcessColumns::<3, ProcessMismatch>::new(&[]).expect("none");
+    /// let noise = points.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &points, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let outputs = [Declared::hard(OutputMismatch::MeasurementScale { source: 1 })];
+    /// let rule = Constrained::new(&belief, &process, &outputs, &points);
+    /// // L Delta = T.
+    /// let constraints = rule.constraints(&linearised)?;
+    /// let gain = constraints.gain(&linearised)?;
+    /// for (delta, t) in constraints.columns() {
+    ///     assert!((gain * delta - t).norm() < 1e-9);
+    /// }
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     pub fn constraints<G: Pose<D, N>>(
         &self,
         linearised: &Linearised<G, D, M>,

@@ -120,6 +120,23 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     ///
     /// # Errors
     /// [`UpdateError::TooManyConstraints`] beyond [`MAX_COLUMNS`]; nothing is added then.
+    ///
+    /// ```
+    /// use inekf::filter::{Constraints, UpdateError};
+    /// use inekf::filter::constraint::MAX_COLUMNS;
+    /// use inekf::model::Columns;
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
+    ///
+    /// for _ in 0..MAX_COLUMNS {
+    ///     constraints.push(&along_x, &no_motion, 0.1)?;
+    /// }
+    /// // There is no room for more.
+    /// assert_eq!(constraints.push(&along_x, &no_motion, 0.1), Err(UpdateError::TooManyConstraints));
+    /// # Ok::<(), UpdateError>(())
+    /// ```
     pub fn push(
         &mut self,
         delta: &Columns<M>,
@@ -144,6 +161,19 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     }
 
     /// The columns of (Delta, T), as they were added.
+    ///
+    /// ```
+    /// # use inekf::filter::UpdateError;
+    /// use inekf::filter::Constraints;
+    /// use inekf::model::Columns;
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
+    /// constraints.push(&along_x, &Columns::one(Vector3::y()), f64::INFINITY)?;
+    /// assert_eq!(constraints.columns().next(), Some((&Vector2::x(), &Vector3::y())));
+    /// # Ok::<(), UpdateError>(())
+    /// ```
     pub fn columns(&self) -> impl Iterator<Item = (&SVector<f64, M>, &SVector<f64, D>)> {
         self.all().iter().map(|column| (&column.delta, &column.t))
     }
@@ -263,6 +293,23 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     ///
     /// # Errors
     /// [`UpdateError::UnsolvableConstraints`].
+    ///
+    /// ```
+    /// use inekf::filter::{Constraints, UpdateError};
+    /// use inekf::model::Columns;
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
+    /// constraints.push(&along_x, &no_motion, f64::INFINITY)?;
+    /// constraints.push(&Columns::one(2.0 * Vector2::x()), &no_motion, f64::INFINITY)?;
+    /// // The second says what the first says.
+    /// assert_eq!(constraints.rank()?, 1);
+    /// // Along x a gain cannot lead nowhere and somewhere.
+    /// constraints.push(&along_x, &Columns::one(Vector3::y()), f64::INFINITY)?;
+    /// assert_eq!(constraints.rank(), Err(UpdateError::UnsolvableConstraints));
+    /// # Ok::<(), UpdateError>(())
+    /// ```
     pub fn rank(&self) -> Result<usize, UpdateError> {
         Ok(self.basis(&SMatrix::identity())?.rank)
     }
@@ -271,6 +318,34 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     ///
     /// # Errors
     /// [`UpdateError::UnsolvableConstraints`], or that S with the soft constraints is not positive definite.
+    ///
+    /// ```
+    /// # use inekf::filter::UpdateError;
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Matrix2;
+    /// use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::Columns;
+    /// use nalgebra::{SVector, Vector2, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
+    /// // Soft: a variance more along x, P / (P + N + sigma^2).
+    /// constraints.push(&along_x, &no_motion, 1.0)?;
+    /// let gain = constraints.gain(&linearised)?;
+    /// assert!((gain[(1, 0)] - 1.0 / 3.0).abs() < 1e-12 && (gain[(2, 1)] - 0.5).abs() < 1e-12);
+    /// # Ok::<(), UpdateError>(())
+    /// ```
     pub fn gain<G: LieGroup<D>>(
         &self,
         linearised: &Linearised<G, D, M>,
@@ -291,6 +366,34 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
     ///
     /// # Errors
     /// As [`gain`](Self::gain).
+    ///
+    /// ```
+    /// # use inekf::filter::UpdateError;
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Matrix2;
+    /// use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::Columns;
+    /// use nalgebra::{SVector, Vector2, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
+    /// // A metre off along both axes, of variance 2. Along x nothing can be said: what is left is that along y.
+    /// constraints.push(&along_x, &no_motion, f64::INFINITY)?;
+    /// let judgement = constraints.judge(&linearised)?;
+    /// assert!((judgement.nis - 0.5).abs() < 1e-12 && judgement.degrees == 1);
+    /// # Ok::<(), UpdateError>(())
+    /// ```
     pub fn judge<G: LieGroup<D>>(
         &self,
         linearised: &Linearised<G, D, M>,
@@ -309,6 +412,35 @@ impl<const D: usize, const M: usize> Constraints<D, M> {
 
     /// The covariance after a correction with `gain`: Joseph's form with what the soft constraints add,
     /// `sigma^2 (T - L Delta)(T - L Delta)^T`. Hard constraints add nothing: there `L Delta = T`.
+    ///
+    /// ```
+    /// # use inekf::filter::UpdateError;
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Matrix2;
+    /// use inekf::filter::{Belief, Constraints, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::Columns;
+    /// use nalgebra::{SVector, Vector2, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let (along_x, no_motion) = (Columns::one(Vector2::x()), Columns::one(Vector3::zeros()));
+    /// let mut constraints = Constraints::<3, 2>::default();
+    /// constraints.push(&along_x, &no_motion, f64::INFINITY)?;
+    /// let gain = constraints.gain(&linearised)?;
+    /// // Nothing is learnt along x, half along y.
+    /// let after = constraints.covariance(&p, &linearised, &gain);
+    /// assert!((after.matrix().diagonal() - Vector3::new(0.01, 1.0, 0.5)).norm() < 1e-12);
+    /// # Ok::<(), UpdateError>(())
+    /// ```
     pub fn covariance<G: LieGroup<D>>(
         &self,
         prior: &Covariance<D>,

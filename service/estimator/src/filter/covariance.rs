@@ -148,6 +148,15 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// The full matrix.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::Matrix2;
+    ///
+    /// // Symmetric, to the last bit.
+    /// let p = Covariance::from_upper(Matrix2::new(4.0, 0.1 + 0.2, 0.3, 9.0));
+    /// assert_eq!(p.matrix(), &p.matrix().transpose());
+    /// ```
     pub fn matrix(&self) -> &SMatrix<f64, D, D> {
         &self.0
     }
@@ -318,6 +327,15 @@ impl<const D: usize> Covariance<D> {
     }
 
     /// `factor * P`.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use nalgebra::Vector2;
+    ///
+    /// // Three standard deviations instead of one.
+    /// let p = Covariance::from_variances(&Vector2::new(4.0, 1.0)).scaled(9.0);
+    /// assert_eq!(p.matrix()[(0, 0)].sqrt(), 3.0 * 2.0);
+    /// ```
     pub fn scaled(&self, factor: f64) -> Self {
         Self(self.0 * factor)
     }

@@ -92,6 +92,16 @@ impl<const M: usize> Factor<M> {
     }
 
     /// `1 / d_i`.
+    ///
+    /// ```
+    /// use inekf::filter::Factor;
+    /// use nalgebra::Matrix2;
+    ///
+    /// // det S is the product of the d_i.
+    /// let s = Matrix2::new(4.0, 2.0, 2.0, 3.0);
+    /// let factor = Factor::new(&s).expect("positive definite");
+    /// assert!((factor.reciprocals().product() * s.determinant() - 1.0).abs() < 1e-14);
+    /// ```
     #[inline]
     pub fn reciprocals(&self) -> &SVector<f64, M> {
         &self.reciprocals

@@ -90,6 +90,30 @@ pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
     ///
     /// # Errors
     /// [`UpdateError`].
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, GainRule, Kalman, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    ///
+    /// // A metre off along both axes, of variance 1 + 1 each.
+    /// let judgement = Kalman.judge(&linearised)?;
+    /// assert!((judgement.nis - 1.0).abs() < 1e-12 && judgement.degrees == 2);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     fn judge(&self, linearised: &Linearised<G, D, M>) -> Result<Judgement, UpdateError> {
         Ok(Judgement {
             nis: linearised.normalised_square(),
@@ -101,6 +125,30 @@ pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
     ///
     /// # Errors
     /// [`UpdateError`].
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Matrix2;
+    /// use inekf::filter::{Belief, Covariance, GainRule, Kalman, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{SVector, Vector2, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    ///
+    /// // K = P H^T S^-1: half, where the fix is as good as what was known, and nothing of the heading.
+    /// let gain = Kalman.gain(&p, &linearised)?;
+    /// assert!((gain * Vector2::new(1.0, 2.0) - Vector3::new(0.0, 0.5, 1.0)).norm() < 1e-12);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     fn gain(
         &self,
         prior: &Covariance<D>,
@@ -111,6 +159,31 @@ pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
     ///
     /// # Errors
     /// [`UpdateError`].
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, GainRule, Kalman, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    ///
+    /// // From the prior the target is the residual. P eta = xi.
+    /// let iterate = Kalman.step(&p, &linearised, &linearised.residual)?;
+    /// assert!((iterate.xi - Vector3::new(0.0, 0.5, 0.5)).norm() < 1e-12);
+    /// assert!((p.matrix() * iterate.eta - iterate.xi).norm() < 1e-12);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     fn step(
         &self,
         prior: &Covariance<D>,
@@ -127,6 +200,30 @@ pub trait GainRule<G: LieGroup<D>, const D: usize, const M: usize> {
     ///
     /// # Errors
     /// [`UpdateError`].
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, GainRule, Kalman, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    ///
+    /// // As good as what was known: half of the variance is left. The heading is not seen.
+    /// let after = Kalman.covariance(&p, &linearised)?;
+    /// assert!((after.matrix().diagonal() - Vector3::new(0.01, 0.5, 0.5)).norm() < 1e-12);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     fn covariance(
         &self,
         prior: &Covariance<D>,

@@ -79,6 +79,23 @@ pub struct LateCorrection<G, S, const D: usize> {
 
 impl<G: LieGroup<D>, S: LateSide, const D: usize> LateCorrection<G, S, D> {
     /// What changed from `before` the measurement to `after` it.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, LateCorrection, Left, propagate_odometry};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Drift, OdometryStep};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+    /// let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
+    /// // Nothing was changed, so nothing is carried on.
+    /// let late = LateCorrection::between(&then, &then);
+    /// let carried = late.carried(&Drift::none(), &now).expect("nothing was taken away");
+    /// assert!(carried.mean.between(&now.mean).log().norm() < 1e-12);
+    /// assert!((carried.covariance.matrix() - now.covariance.matrix()).norm() < 1e-12);
+    /// ```
     pub fn between(before: &Belief<G, S, D>, after: &Belief<G, S, D>) -> Self {
         Self {
             before: before.mean,
@@ -92,6 +109,35 @@ impl<G: LieGroup<D>, S: LateSide, const D: usize> LateCorrection<G, S, D> {
     /// if they had led to it from the one after. Biases and measurements in between have no place in this.
     ///
     /// `None` where less than [`LEAST_SHARE`] of a variance remains, so that the subtraction would lose digits: replay.
+    ///
+    /// ```
+    /// # use inekf::filter::{UpdateOptions, update};
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, LateCorrection, Left, propagate_odometry};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Drift, OdometryStep};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+    /// let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
+    /// # let corrected_by = |variance: f64| {
+    /// #     let fix = PlanarFix::new([PointFix {
+    /// #         position_w: Vector2::new(0.5, -0.2),
+    /// #         covariance_w: Matrix2::identity() * variance,
+    /// #         lever_arm_b: Vector2::zeros(),
+    /// #         scale_error: 0.0,
+    /// #     }]);
+    /// #     let mut corrected = then;
+    /// #     update(&mut corrected, &fix, &UpdateOptions::PLAIN).map(|_| corrected)
+    /// # };
+    /// // A thousand times as good as what was known: too little would be left of a difference.
+    /// let late = LateCorrection::between(&then, &corrected_by(1e-6)?);
+    /// assert!(late.carried(&Drift::none(), &now).is_none());
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     pub fn carried<A: Automorphism<G, D>>(
         &self,
         drift: &Drift<G, A, D>,
@@ -102,6 +148,36 @@ impl<G: LieGroup<D>, S: LateSide, const D: usize> LateCorrection<G, S, D> {
     }
 
     /// [`carried`](Self::carried) in any case, with the least share of a variance that remains.
+    ///
+    /// ```
+    /// # use inekf::filter::{UpdateOptions, update};
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, LateCorrection, Left, propagate_odometry};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Drift, OdometryStep};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+    /// let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
+    /// # let corrected_by = |variance: f64| {
+    /// #     let fix = PlanarFix::new([PointFix {
+    /// #         position_w: Vector2::new(0.5, -0.2),
+    /// #         covariance_w: Matrix2::identity() * variance,
+    /// #         lever_arm_b: Vector2::zeros(),
+    /// #         scale_error: 0.0,
+    /// #     }]);
+    /// #     let mut corrected = then;
+    /// #     update(&mut corrected, &fix, &UpdateOptions::PLAIN).map(|_| corrected)
+    /// # };
+    /// // As good as what was known: half of the variance is left, and by now a little was added.
+    /// let late = LateCorrection::between(&then, &corrected_by(1.0)?);
+    /// let (_, share) = late.carried_with_share(&Drift::none(), &now);
+    /// assert!(share > 0.5 && share < 0.52);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     pub fn carried_with_share<A: Automorphism<G, D>>(
         &self,
         drift: &Drift<G, A, D>,
@@ -137,8 +213,50 @@ fn less<const D: usize>(p: &Covariance<D>, lost: &SMatrix<f64, D, D>) -> (Covari
 
 /// A side on which a correction is carried on in time: in coordinates of the left-invariant error, unless it has better
 /// ones.
+///
+/// ```
+/// use inekf::filter::{Additive, Belief, Covariance, LateSide, Left, Right};
+/// use inekf::lie::{LieGroup, SE2};
+/// use nalgebra::Vector3;
+///
+/// fn lost<S: LateSide>() -> f64 {
+///     let known = |variance| {
+///         let p = Covariance::from_variances(&Vector3::repeat(variance));
+///         Belief::<SE2, S, 3>::new(SE2::identity(), p)
+///     };
+///     S::lost(&known(1.0), &known(0.25))[(1, 1)]
+/// }
+/// // At the origin all errors are one.
+/// assert_eq!((lost::<Left>(), lost::<Right>(), lost::<Additive>()), (0.75, 0.75, 0.75));
+/// ```
 pub trait LateSide: Side {
     /// What the covariance lost from `before` to `after` a measurement, in coordinates around the mean before.
+    ///
+    /// ```
+    /// # use inekf::filter::{UpdateOptions, update};
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, LateSide, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let corrected_by = |variance: f64| {
+    /// #     let fix = PlanarFix::new([PointFix {
+    /// #         position_w: Vector2::new(0.5, -0.2),
+    /// #         covariance_w: Matrix2::identity() * variance,
+    /// #         lever_arm_b: Vector2::zeros(),
+    /// #         scale_error: 0.0,
+    /// #     }]);
+    /// #     let mut corrected = then;
+    /// #     update(&mut corrected, &fix, &UpdateOptions::PLAIN).map(|_| corrected)
+    /// # };
+    /// // P - P+, of a fix as good as what was known.
+    /// let lost = Left::lost(&then, &corrected_by(1.0)?);
+    /// assert!((lost.diagonal() - Vector3::new(0.0, 0.5, 0.5)).norm() < 1e-12);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     #[inline]
     fn lost<G: LieGroup<D>, const D: usize>(
         before: &Belief<G, Self, D>,
@@ -149,6 +267,36 @@ pub trait LateSide: Side {
 
     /// What is left of the covariance of `now` of such a loss, in coordinates around its mean, after `drift` and the
     /// motion `body`, and the least share of a variance that this is.
+    ///
+    /// ```
+    /// # use inekf::filter::{UpdateOptions, update};
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, LateSide, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::Drift;
+    /// use nalgebra::Vector3;
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let corrected_by = |variance: f64| {
+    /// #     let fix = PlanarFix::new([PointFix {
+    /// #         position_w: Vector2::new(0.5, -0.2),
+    /// #         covariance_w: Matrix2::identity() * variance,
+    /// #         lever_arm_b: Vector2::zeros(),
+    /// #         scale_error: 0.0,
+    /// #     }]);
+    /// #     let mut corrected = then;
+    /// #     update(&mut corrected, &fix, &UpdateOptions::PLAIN).map(|_| corrected)
+    /// # };
+    /// // Of the belief before, which has not moved since, the one after remains.
+    /// let corrected = corrected_by(1.0)?;
+    /// let lost = Left::lost(&then, &corrected);
+    /// let (remaining, share) = Left::remaining(&lost, &Drift::none(), &SE2::identity(), &then);
+    /// assert!((remaining.matrix() - corrected.covariance.matrix()).norm() < 1e-12);
+    /// assert!((share - 0.5).abs() < 1e-12);
+    /// # Ok::<(), inekf::filter::UpdateError>(())
+    /// ```
     #[inline]
     fn remaining<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize>(
         lost: &SMatrix<f64, D, D>,
@@ -163,6 +311,21 @@ pub trait LateSide: Side {
     }
 
     /// The belief at `mean` whose covariance is `remaining` in coordinates around the mean of `now`.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, LateSide, Left, propagate_odometry};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let then = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let step = OdometryStep::new(&Vector3::new(0.1, 5.0, 0.0), 1.0);
+    /// let now = propagate_odometry(&then, &step, &(Matrix3::identity() * 0.01));
+    /// // A left-invariant error is the same wherever the mean is.
+    /// let moved = Left::recentred(&p, &then, now.mean);
+    /// assert_eq!((moved.mean, moved.covariance), (now.mean, p));
+    /// ```
     #[inline]
     fn recentred<G: LieGroup<D>, const D: usize>(
         remaining: &Covariance<D>,

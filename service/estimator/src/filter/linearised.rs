@@ -92,6 +92,31 @@ pub(crate) fn is_mild<const M: usize>(
 impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     /// `observation` around `chi`, which lies `xi` away from the mean of `belief`. `None` if the innovation
     /// covariance is not positive definite.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Matrix2;
+    /// use inekf::filter::{Belief, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{SVector, Vector2, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// // At another point on the way: y - h(chi_i), with a Jacobian there.
+    /// let xi = Vector3::new(0.1, 0.5, 0.0);
+    /// let chi = SE2::exp(&xi);
+    /// let half_way = Linearised::at(&belief, &fix, &chi, &xi, &noise).expect("definite");
+    /// assert!((half_way.residual - (Vector2::new(1.0, 1.0) - chi.position)).norm() < 1e-12);
+    /// // No noise is negative.
+    /// assert!(Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &(-2.0 * noise)).is_none());
+    /// ```
     #[inline(always)]
     pub fn at<S, O>(
         belief: &Belief<G, S, D>,
@@ -128,6 +153,27 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     }
 
     /// S, M x M.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::Vector2;
+    /// use inekf::filter::{Belief, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{Matrix2, SVector, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// // P + N, 1 + 1 on each axis.
+    /// assert!((linearised.innovation_covariance() - Matrix2::from_diagonal_element(2.0)).norm() < 1e-12);
+    /// ```
     pub fn innovation_covariance(&self) -> SMatrix<f64, M, M> {
         self.covariance
     }
@@ -184,11 +230,53 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     }
 
     /// `z^T S^-1 z`.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// // A metre off along both axes, of variance 2: a half each.
+    /// assert!((linearised.normalised_square() - 1.0).abs() < 1e-12);
+    /// ```
     pub fn normalised_square(&self) -> f64 {
         self.innovation.normalised_square(&self.residual)
     }
 
     /// `ln det S`.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left, Linearised};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let belief = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// # let fix = PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(1.0, 1.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let noise = fix.noise_covariance();
+    /// let linearised = Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &noise).expect("definite");
+    /// let s = linearised.innovation_covariance();
+    /// assert!((linearised.log_determinant() - s.determinant().ln()).abs() < 1e-12);
+    /// ```
     pub fn log_determinant(&self) -> f64 {
         self.innovation.log_determinant()
     }

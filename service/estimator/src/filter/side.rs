@@ -83,6 +83,20 @@ pub trait Side: Copy + Clone + Debug + PartialEq {
 
     /// K with `difference(retract(chi, e), retract(chi, xi)) = xi - J^-1 K e` to first order in e, J the
     /// [`jacobian`](Self::jacobian): how a difference follows the point that it is taken from.
+    ///
+    /// ```
+    /// use inekf::filter::{Left, Side};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use nalgebra::Vector3;
+    ///
+    /// let (chi, xi) = (SE2::exp(&Vector3::new(0.5, 3.0, 1.0)), Vector3::new(0.3, 0.2, -0.4));
+    /// let e = Vector3::new(1.0, -2.0, 0.5) * 1e-6;
+    /// let j = Left::jacobian::<SE2, 3>(&xi);
+    /// let back = j.try_inverse().expect("below a full turn") * Left::origin_jacobian::<SE2, 3>(&xi);
+    /// // The start moves by e, and the difference by as much the other way, seen from its end.
+    /// let moved = Left::difference(&Left::retract(&chi, &e), &Left::retract(&chi, &xi));
+    /// assert!((moved - (xi - back * e)).norm() < 1e-10);
+    /// ```
     fn origin_jacobian<G: LieGroup<D>, const D: usize>(xi: &SVector<f64, D>) -> SMatrix<f64, D, D>;
 
     /// A, with `xi_side = A xi_left` at `chi`, to first order.
@@ -116,8 +130,43 @@ pub trait Side: Copy + Clone + Debug + PartialEq {
 }
 
 /// A side on which a belief moves with an IMU: its error has a transition in blocks.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, InertialSide, Left, Right, propagate};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::{Discretisation, ImuInput, ImuNoise};
+/// use nalgebra::{SVector, Vector3};
+///
+/// fn moved<S: InertialSide>() -> SE23 {
+///     let p = Covariance::from_variances(&SVector::repeat(0.1));
+///     let push = ImuInput { omega_b: Vector3::new(0.0, 0.0, 0.5), force_b: Vector3::new(1.0, 0.0, 9.8) };
+///     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+///     let belief = Belief::<SE23, S, 9>::new(SE23::identity(), p);
+///     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+///     propagate(&belief, &push, &g_w, 0.1, Discretisation::ZeroOrderHold, &noise).mean
+/// }
+/// // The side is one of the error, not of the estimate.
+/// assert_eq!(moved::<Left>(), moved::<Right>());
+/// ```
 pub trait InertialSide: LateSide {
     /// How the error of an inertial state moves with `increment`, from the pose `before` to the pose `after`.
+    ///
+    /// ```
+    /// use inekf::filter::{InertialSide, Left, Right};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuIncrement, ImuInput};
+    /// use nalgebra::Vector3;
+    ///
+    /// let push = ImuInput { omega_b: Vector3::new(0.0, 0.0, 0.5), force_b: Vector3::new(1.0, 0.0, 9.8) };
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let increment = ImuIncrement::new(&push, &g_w, 0.1, Discretisation::ZeroOrderHold);
+    /// let (before, after) = (SE23::identity(), increment.apply(&SE23::identity()));
+    /// // A wrong attitude turns what the body felt; seen from the world, what gravity did.
+    /// let of_left = Left::transition(&increment, &before, &after);
+    /// let of_right = Right::transition(&increment, &before, &after);
+    /// assert_eq!(of_left.couplings, increment.body.map(|part| -part));
+    /// assert_eq!(of_right.couplings, increment.world);
+    /// ```
     fn transition(increment: &ImuIncrement, before: &SE23, after: &SE23) -> Transition;
 }
 

@@ -192,6 +192,15 @@ pub struct RotationSeries {
 
 impl RotationSeries {
     /// Evaluates the functions at the rotation vector `phi`, in radians.
+    ///
+    /// ```
+    /// use inekf::lie::series::RotationSeries;
+    /// use nalgebra::Vector3;
+    ///
+    /// // No division by the angle: at zero as anywhere else, S_k = 1 / k!.
+    /// let series = RotationSeries::at(&Vector3::zeros());
+    /// assert_eq!(series.values()[..4], [1.0, 1.0, 0.5, 1.0 / 6.0]);
+    /// ```
     #[inline]
     #[must_use]
     pub fn at(phi: &Vector3<f64>) -> Self {
@@ -202,6 +211,14 @@ impl RotationSeries {
     }
 
     /// The rotation vector, rad.
+    ///
+    /// ```
+    /// use inekf::lie::series::RotationSeries;
+    /// use nalgebra::Vector3;
+    ///
+    /// let phi = Vector3::new(0.3, -0.5, 0.8);
+    /// assert_eq!(RotationSeries::at(&phi).phi(), &phi);
+    /// ```
     #[inline]
     #[must_use]
     pub fn phi(&self) -> &Vector3<f64> {
@@ -209,6 +226,16 @@ impl RotationSeries {
     }
 
     /// The values `S_0 ..= S_6`.
+    ///
+    /// ```
+    /// use inekf::lie::series::RotationSeries;
+    /// use nalgebra::Vector3;
+    ///
+    /// // cos, and sin by the angle.
+    /// let (phi, angle) = (Vector3::new(0.0, 0.6, 0.8), 1_f64);
+    /// let [s_0, s_1, ..] = *RotationSeries::at(&phi).values();
+    /// assert!((s_0 - angle.cos()).abs() < 1e-15 && (s_1 - angle.sin() / angle).abs() < 1e-15);
+    /// ```
     #[inline]
     #[must_use]
     pub fn values(&self) -> &[f64; COUNT] {

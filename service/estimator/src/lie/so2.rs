@@ -38,12 +38,29 @@ impl SO2 {
     }
 
     /// The angle in radians, in `[-pi, pi]`, counter-clockwise.
+    ///
+    /// ```
+    /// use inekf::lie::SO2;
+    ///
+    /// // Three quarters to the left are one to the right.
+    /// let turned = SO2::from_angle(270_f64.to_radians());
+    /// assert!((turned.angle_rad().to_degrees() + 90.0).abs() < 1e-12);
+    /// ```
     #[must_use]
     pub fn angle_rad(&self) -> f64 {
         self.sin.atan2(self.cos)
     }
 
     /// The rotation matrix, body to world.
+    ///
+    /// ```
+    /// use inekf::lie::SO2;
+    /// use nalgebra::Vector2;
+    ///
+    /// // A quarter to the left: what is ahead of the body lies north.
+    /// let r_wb = SO2::from_angle(90_f64.to_radians()).matrix();
+    /// assert!((r_wb * Vector2::x() - Vector2::y()).norm() < 1e-15);
+    /// ```
     #[must_use]
     pub fn matrix(&self) -> Matrix2<f64> {
         Matrix2::new(self.cos, -self.sin, self.sin, self.cos)

@@ -40,6 +40,17 @@ fn with_identity<const B: usize, const D: usize>(block: &SMatrix<f64, B, B>) -> 
 
 impl<G: LieGroup<B>, const B: usize, const P: usize, const D: usize> Augmented<G, B, P, D> {
     /// The pose with these parameters.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::Augmented;
+    /// use nalgebra::{Vector1, Vector3, Vector4};
+    ///
+    /// // The pose's coordinates, then the parameters.
+    /// let pose = SE2::exp(&Vector3::new(0.5, 3.0, 1.0));
+    /// let state = Augmented::<SE2, 3, 1, 4>::new(pose, Vector1::new(0.1));
+    /// assert!((state.log() - Vector4::new(0.5, 3.0, 1.0, 0.1)).norm() < 1e-12);
+    /// ```
     pub fn new(pose: G, parameters: SVector<f64, P>) -> Self {
         const {
             assert!(

@@ -122,11 +122,37 @@ impl<G: LieGroup<D>, const D: usize> Drift<G, Unmoved, D> {
 
 impl<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize> Drift<G, A, D> {
     /// `W phi(chi)`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Drift, InertialState};
+    /// use nalgebra::Vector3;
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let pose = SE23 { velocity: Vector3::new(5.0, 0.0, 0.0), ..SE23::identity() };
+    ///
+    /// // As long at once as in two parts.
+    /// let (part, whole) = (Drift::free_fall(&g_w, 0.5), Drift::free_fall(&g_w, 1.0));
+    /// assert!(part.apply(&part.apply(&pose)).between(&whole.apply(&pose)).log().norm() < 1e-12);
+    /// ```
     pub fn apply(&self, chi: &G) -> G {
         self.world.compose(&self.automorphism.apply(chi))
     }
 
     /// U, what the body felt on its way from `then` to `now`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Drift, InertialState};
+    /// use nalgebra::Vector3;
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let pose = SE23 { velocity: Vector3::new(5.0, 0.0, 0.0), ..SE23::identity() };
+    ///
+    /// // In free fall a body feels nothing.
+    /// let drift = Drift::free_fall(&g_w, 2.0);
+    /// assert!(drift.body_between(&pose, &drift.apply(&pose)).log().norm() < 1e-12);
+    /// ```
     pub fn body_between(&self, then: &G, now: &G) -> G {
         self.apply(then).between(now)
     }

@@ -26,14 +26,60 @@ use crate::lie::{LieGroup, SE23};
 /// ```
 pub trait Automorphism<G: LieGroup<D>, const D: usize> {
     /// `phi(chi)`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Automorphism, FreeMotion};
+    /// use nalgebra::SVector;
+    ///
+    /// let chi = SE23::exp(&SVector::repeat(0.3));
+    /// // The neutral element stays where it is.
+    /// let free = FreeMotion { dt_s: 0.5 };
+    /// assert_eq!(free.apply(&SE23::identity()), SE23::identity());
+    /// assert_eq!(free.apply(&chi).position, chi.position + chi.velocity * 0.5);
+    /// ```
     fn apply(&self, chi: &G) -> G;
     /// M, D x D, with `phi(chi exp(xi)) = phi(chi) exp(M xi)` (\[IS\] (3)).
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Automorphism, FreeMotion};
+    /// use nalgebra::SVector;
+    ///
+    /// let chi = SE23::exp(&SVector::repeat(0.3));
+    /// // An error of any size goes through it by one matrix.
+    /// let (free, xi) = (FreeMotion { dt_s: 0.5 }, SVector::<f64, 9>::from_fn(|i, _| 0.2 - 0.04 * i as f64));
+    /// let error = free.apply(&chi).between(&free.apply(&chi.compose(&SE23::exp(&xi))));
+    /// assert!((error.log() - free.differential() * xi).norm() < 1e-12);
+    /// ```
     fn differential(&self) -> SMatrix<f64, D, D>;
     /// `a M`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Automorphism, FreeMotion};
+    /// use nalgebra::SVector;
+    ///
+    /// let chi = SE23::exp(&SVector::repeat(0.3));
+    /// let (free, a) = (FreeMotion { dt_s: 0.5 }, chi.adjoint());
+    /// assert!((free.times_differential(a) - a * free.differential()).norm() < 1e-12);
+    /// ```
     fn times_differential(&self, a: SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
         a * self.differential()
     }
     /// Makes the symmetric matrix P `M P M^T`.
+    ///
+    /// ```
+    /// use inekf::model::{Automorphism, FreeMotion};
+    /// use nalgebra::{SMatrix, SVector};
+    ///
+    /// let (free, m) = (FreeMotion { dt_s: 0.5 }, FreeMotion { dt_s: 0.5 }.differential());
+    /// let variances = SVector::<f64, 9>::from_fn(|i, _| 1.0 + i as f64);
+    /// let before = SMatrix::<f64, 9, 9>::from_diagonal(&variances);
+    /// let mut p = before;
+    /// free.congruence(&mut p);
+    /// assert!((p - m * before * m.transpose()).norm() < 1e-12);
+    /// ```
     fn congruence(&self, p: &mut SMatrix<f64, D, D>) {
         let m = self.differential();
         *p = m * *p * m.transpose();
@@ -129,6 +175,18 @@ pub struct GroupAffineStep<G, A, const D: usize> {
 
 impl<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize> GroupAffineStep<G, A, D> {
     /// The step with the given parts.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{FreeMotion, GroupAffineStep};
+    /// use nalgebra::SVector;
+    ///
+    /// let chi = SE23::exp(&SVector::repeat(0.3));
+    /// // Nothing acts and no time goes by.
+    /// let nothing = SE23::identity();
+    /// let step = GroupAffineStep::new(nothing, FreeMotion { dt_s: 0.0 }, nothing);
+    /// assert!(step.apply(&chi).between(&chi).log().norm() < 1e-12);
+    /// ```
     pub fn new(world: G, automorphism: A, body: G) -> Self {
         Self {
             world,
@@ -139,6 +197,20 @@ impl<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize> GroupAffineStep<G, A
     }
 
     /// `W * phi(chi) * U`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{FreeMotion, GroupAffineStep};
+    /// use nalgebra::SVector;
+    ///
+    /// let chi = SE23::exp(&SVector::repeat(0.3));
+    /// let other = SE23::exp(&SVector::repeat(-0.4));
+    /// // The world acts from the left, the body from the right.
+    /// let step = GroupAffineStep::new(other, FreeMotion { dt_s: 0.0 }, SE23::identity());
+    /// assert!(step.apply(&chi).between(&(other * chi)).log().norm() < 1e-12);
+    /// let step = GroupAffineStep::new(SE23::identity(), FreeMotion { dt_s: 0.0 }, other);
+    /// assert!(step.apply(&chi).between(&(chi * other)).log().norm() < 1e-12);
+    /// ```
     pub fn apply(&self, chi: &G) -> G {
         self.world
             .compose(&self.automorphism.apply(chi))
@@ -146,6 +218,18 @@ impl<G: LieGroup<D>, A: Automorphism<G, D>, const D: usize> GroupAffineStep<G, A
     }
 
     /// F, D x D, of the left-invariant error: `Ad_{U^-1} M` (\[IS\], Proposition 1).
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{FreeMotion, GroupAffineStep};
+    /// use nalgebra::SVector;
+    ///
+    /// let chi = SE23::exp(&SVector::repeat(0.3));
+    /// let other = SE23::exp(&SVector::repeat(-0.4));
+    /// // The body's share alone decides, not gravity.
+    /// let step = |world| GroupAffineStep::new(world, FreeMotion { dt_s: 0.2 }, chi);
+    /// assert_eq!(step(SE23::identity()).left_jacobian(), step(other).left_jacobian());
+    /// ```
     pub fn left_jacobian(&self) -> SMatrix<f64, D, D> {
         self.automorphism
             .times_differential(self.body.inverse().adjoint())

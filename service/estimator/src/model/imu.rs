@@ -55,6 +55,15 @@ pub struct ImuInput {
 
 impl ImuInput {
     /// The mean of two inputs.
+    ///
+    /// ```
+    /// use inekf::model::ImuInput;
+    /// use nalgebra::Vector3;
+    ///
+    /// let push = ImuInput { omega_b: Vector3::new(0.1, 0.2, 0.5), force_b: Vector3::new(1.0, 0.0, 9.8) };
+    /// let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.8) };
+    /// assert_eq!(push.midpoint(&at_rest).omega_b, 0.5 * push.omega_b);
+    /// ```
     #[inline]
     pub fn midpoint(&self, other: &Self) -> Self {
         Self {
@@ -121,6 +130,18 @@ pub struct ImuStep {
 
 impl ImuStep {
     /// The step over `dt_s` seconds with the bias-free `input` under gravity `g_w`, m/s^2.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, ImuStep};
+    /// use nalgebra::Vector3;
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// // The accelerometer at rest shows what holds it up: nothing moves.
+    /// let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: -g_w };
+    /// let step = ImuStep::new(&at_rest, &g_w, 10.0, Discretisation::ZeroOrderHold);
+    /// assert!(step.apply(&SE23::identity()).log().norm() < 1e-12);
+    /// ```
     pub fn new(
         input: &ImuInput,
         g_w: &Vector3<f64>,
@@ -131,6 +152,19 @@ impl ImuStep {
     }
 
     /// `W phi(pose) U`, without the products by what is known to be neutral.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, ImuStep};
+    /// use nalgebra::Vector3;
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let push = ImuInput { omega_b: Vector3::new(0.1, 0.2, 0.5), force_b: Vector3::new(1.0, 0.0, 9.8) };
+    /// let pose = SE23 { velocity: Vector3::new(5.0, 0.0, 0.0), ..SE23::identity() };
+    /// let step = ImuStep::new(&push, &g_w, 0.1, Discretisation::ZeroOrderHold);
+    /// // The same as the product of the three.
+    /// assert!(step.apply(&pose).between(&step.step.apply(&pose)).log().norm() < 1e-12);
+    /// ```
     pub fn apply(&self, pose: &SE23) -> SE23 {
         let GroupAffineStep { world, body, .. } = &self.step;
         moved(

@@ -137,6 +137,19 @@ impl Squares {
 
 impl ImuIncrement {
     /// The motion over `dt_s` seconds with the bias-free `input` under gravity `g_w`, m/s^2.
+    ///
+    /// ```
+    /// use inekf::model::{Discretisation, ImuIncrement, ImuInput};
+    /// use nalgebra::Vector3;
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// // Half a second of 1 rad/s about the vertical turns by half a radian.
+    /// let turning = ImuInput { omega_b: Vector3::z(), force_b: -g_w };
+    /// let increment = ImuIncrement::new(&turning, &g_w, 0.5, Discretisation::ZeroOrderHold);
+    /// assert!((increment.turn.heading_rad() - 0.5).abs() < 1e-12);
+    /// // Along the axis the force adds as if there were no turn.
+    /// assert!((increment.body[0] + g_w * 0.5).norm() < 1e-12);
+    /// ```
     #[inline(always)]
     pub fn new(
         input: &ImuInput,
@@ -193,12 +206,41 @@ impl ImuIncrement {
     }
 
     /// Where the motion takes `pose`: `W phi(pose) U`, without the products by what is known to be neutral.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuIncrement, ImuInput};
+    /// use nalgebra::Vector3;
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let pose = SE23 { velocity: Vector3::new(5.0, 0.0, 0.0), ..SE23::identity() };
+    /// // Nothing is felt in free fall: gravity alone acts.
+    /// let falling = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::zeros() };
+    /// let increment = ImuIncrement::new(&falling, &g_w, 2.0, Discretisation::ZeroOrderHold);
+    /// let fallen = increment.apply(&pose);
+    /// assert!((fallen.velocity - (pose.velocity + g_w * 2.0)).norm() < 1e-12);
+    /// ```
     #[inline(always)]
     pub fn apply(&self, pose: &SE23) -> SE23 {
         moved(pose, self.dt_s, &self.turn, &self.body, &self.world)
     }
 
     /// How the left-invariant error moves, `chi = chi_hat exp(xi)`: seen from the body, which turns.
+    ///
+    /// ```
+    /// use inekf::lie::LieGroup;
+    /// use inekf::model::{Discretisation, ImuIncrement, ImuInput, ImuStep};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let push = ImuInput { omega_b: Vector3::new(0.1, 0.2, 0.5), force_b: Vector3::new(1.0, 0.0, 9.8) };
+    /// let increment = ImuIncrement::new(&push, &g_w, 0.1, Discretisation::ZeroOrderHold);
+    /// let xi = SVector::<f64, 9>::from_fn(|i, _| 0.01 * i as f64);
+    /// let right_input = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::zeros() };
+    /// // F xi, F as the group-affine step has it.
+    /// let f = ImuStep::from(&increment).step.left_jacobian();
+    /// assert!((increment.left_transition().moved(&xi, &right_input) - f * xi).norm() < 1e-12);
+    /// ```
     #[inline(always)]
     pub fn left_transition(&self) -> Transition {
         let back = self.turn_matrix.transpose();
@@ -222,6 +264,23 @@ impl ImuIncrement {
     /// How the right-invariant error moves, `chi = exp(xi) chi_hat`: gravity alone couples it, and the noise
     /// enters as \[PAR\] (14) has it, by the adjoint of `after`, the pose at the end; `before` is that at the
     /// start.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuIncrement, ImuInput, ImuStep};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let push = ImuInput { omega_b: Vector3::new(0.1, 0.2, 0.5), force_b: Vector3::new(1.0, 0.0, 9.8) };
+    /// let pose = SE23 { velocity: Vector3::new(5.0, 0.0, 0.0), ..SE23::identity() };
+    /// let increment = ImuIncrement::new(&push, &g_w, 0.1, Discretisation::ZeroOrderHold);
+    /// let xi = SVector::<f64, 9>::from_fn(|i, _| 0.01 * i as f64);
+    /// let right_input = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::zeros() };
+    /// // F xi with an F that does not depend on the sample.
+    /// let f = ImuStep::from(&increment).step.right_jacobian();
+    /// let transition = increment.right_transition(&pose, &increment.apply(&pose));
+    /// assert!((transition.moved(&xi, &right_input) - f * xi).norm() < 1e-12);
+    /// ```
     #[inline(always)]
     pub fn right_transition(&self, before: &SE23, after: &SE23) -> Transition {
         let r_wb = Block::rotation(&before.rotation);
@@ -244,6 +303,23 @@ impl ImuIncrement {
 
     /// How the additive error of the EKF moves, every part of it in world axes; `before` is the pose at the
     /// start.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuIncrement, ImuInput};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let pose = SE23 { velocity: Vector3::new(5.0, 0.0, 0.0), ..SE23::identity() };
+    /// // A wrong heading sends the velocity gained the wrong way: across, by the error.
+    /// let ahead = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(2.0, 0.0, 9.80665) };
+    /// let increment = ImuIncrement::new(&ahead, &g_w, 1.0, Discretisation::ZeroOrderHold);
+    /// let mut xi = SVector::<f64, 9>::zeros();
+    /// xi[2] = 0.01;
+    /// let right_input = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::zeros() };
+    /// let moved = increment.additive_transition(&pose).moved(&xi, &right_input);
+    /// assert!((moved[4] - 0.01 * 2.0).abs() < 1e-12);
+    /// ```
     #[inline(always)]
     pub fn additive_transition(&self, before: &SE23) -> Transition {
         let r_wb = Block::rotation(&before.rotation);

@@ -75,6 +75,17 @@ pub enum InertialMismatch {
 
 impl InertialScale {
     /// What a unit of m adds to `input`.
+    ///
+    /// ```
+    /// use inekf::model::{ImuInput, InertialScale};
+    /// use nalgebra::Vector3;
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    ///
+    /// // Gravity's share is scaled too: at rest a wrong scale pushes upwards.
+    /// let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: -g_w };
+    /// assert_eq!(InertialScale::Accel.disturbance(&at_rest).force_b, -g_w);
+    /// ```
     pub fn disturbance(&self, input: &ImuInput) -> ImuInput {
         match self {
             Self::Gyro => rate(input.omega_b),
@@ -85,6 +96,17 @@ impl InertialScale {
 
 impl InertialMismatch {
     /// What a unit of m adds to `input`, whose biases have been removed.
+    ///
+    /// ```
+    /// use inekf::model::{ImuInput, InertialMismatch};
+    /// use nalgebra::Vector3;
+    ///
+    /// let push = ImuInput { omega_b: Vector3::new(0.1, 0.2, 0.5), force_b: Vector3::new(1.0, 0.0, 9.8) };
+    ///
+    /// // A bias is the same whatever the sample, a scale is not.
+    /// let bias = InertialMismatch::GyroBias { axis_b: Vector3::z() };
+    /// assert_eq!(bias.disturbance(&push).omega_b, Vector3::z());
+    /// ```
     pub fn disturbance(&self, input: &ImuInput) -> ImuInput {
         match self {
             Self::GyroBias { axis_b } => rate(*axis_b),

@@ -41,6 +41,13 @@ pub struct Columns<const R: usize> {
 
 impl<const R: usize> Columns<R> {
     /// One column.
+    ///
+    /// ```
+    /// use inekf::model::Columns;
+    /// use nalgebra::Vector2;
+    ///
+    /// assert_eq!(Columns::one(Vector2::new(1.0, 2.0)).as_slice().len(), 1);
+    /// ```
     pub fn one(column: SVector<f64, R>) -> Self {
         Self {
             columns: [column, SVector::zeros(), SVector::zeros()],
@@ -49,16 +56,42 @@ impl<const R: usize> Columns<R> {
     }
 
     /// Three columns.
+    ///
+    /// ```
+    /// use inekf::model::Columns;
+    /// use nalgebra::Vector3;
+    ///
+    /// // One for each axis that a frame may be turned about.
+    /// let about = Columns::three([Vector3::x(), Vector3::y(), Vector3::z()]);
+    /// assert_eq!(about.as_slice()[2], Vector3::z());
+    /// ```
     pub fn three(columns: [SVector<f64, R>; MAX_PARAMETERS]) -> Self {
         Self { columns, count: 3 }
     }
 
     /// The columns.
+    ///
+    /// ```
+    /// use inekf::model::Columns;
+    /// use nalgebra::Vector2;
+    ///
+    /// // As many as there are parameters.
+    /// assert_eq!(Columns::one(Vector2::x()).as_slice(), [Vector2::x()]);
+    /// ```
     pub fn as_slice(&self) -> &[SVector<f64, R>] {
         &self.columns[..self.count]
     }
 
     /// `f` of every column.
+    ///
+    /// ```
+    /// use inekf::model::Columns;
+    /// use nalgebra::{Matrix1x2, Vector1, Vector2};
+    ///
+    /// // H T, as a constraint needs it.
+    /// let (h, t) = (Matrix1x2::new(0.0, 1.0), Columns::one(Vector2::new(5.0, 2.0)));
+    /// assert_eq!(t.map(|t| h * t).as_slice(), [Vector1::new(2.0)]);
+    /// ```
     pub fn map<const Q: usize>(
         &self,
         f: impl Fn(&SVector<f64, R>) -> SVector<f64, Q>,
@@ -91,6 +124,12 @@ pub struct Declared<T> {
 
 impl<T> Declared<T> {
     /// Nothing is known of the size: the constraint of \[LC\].
+    ///
+    /// ```
+    /// use inekf::model::{Declared, ProcessMismatch};
+    ///
+    /// assert!(Declared::hard(ProcessMismatch::OdometryScale).sigma.is_infinite());
+    /// ```
     pub fn hard(mismatch: T) -> Self {
         Self {
             mismatch,
@@ -99,6 +138,13 @@ impl<T> Declared<T> {
     }
 
     /// The parameters have this standard deviation.
+    ///
+    /// ```
+    /// use inekf::model::{Declared, ProcessMismatch};
+    ///
+    /// // Wheels that are off by 2 % or so.
+    /// assert_eq!(Declared::soft(ProcessMismatch::OdometryScale, 0.02).sigma, 0.02);
+    /// ```
     pub fn soft(mismatch: T, sigma: f64) -> Self {
         Self { mismatch, sigma }
     }
@@ -134,6 +180,19 @@ pub enum ProcessMismatch {
 impl ProcessMismatch {
     /// `d_kappa / m` of one step, D, left-invariant: `(0, Omega^T u)` for the scale, `(log Omega, 0)` for that of
     /// the turn, `(dt e, 0)` for the bias.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{OdometryStep, ProcessMismatch};
+    /// use nalgebra::Vector3;
+    ///
+    /// // What a step a little longer than measured differs by, in body axes at its end.
+    /// let (m, increment) = (1e-6, Vector3::new(0.5, 2.0, 1.0));
+    /// let step = OdometryStep::<SE2>::new(&increment, 1.0);
+    /// let longer = OdometryStep::<SE2>::new(&Vector3::new(0.5, 2.0 * (1.0 + m), 1.0 + m), 1.0);
+    /// let change = step.kappa.between(&longer.kappa).log() / m;
+    /// assert!((ProcessMismatch::OdometryScale.direction(&step) - change).norm() < 1e-6);
+    /// ```
     pub fn direction<G: RigidPose<D, N>, const D: usize, const N: usize>(
         &self,
         step: &OdometryStep<G>,
@@ -234,6 +293,13 @@ pub enum OutputMismatch {
 
 impl OutputMismatch {
     /// Index of the source that is wrong.
+    ///
+    /// ```
+    /// use inekf::model::OutputMismatch;
+    ///
+    /// let turned = OutputMismatch::MeasurementRotation { source: 1, axis_w: None };
+    /// assert_eq!(turned.source(), 1);
+    /// ```
     pub fn source(&self) -> usize {
         match *self {
             Self::MeasurementScale { source } | Self::MeasurementRotation { source, .. } => source,
@@ -278,6 +344,28 @@ impl OutputMismatch {
     /// Zero if the source does not exist.
     ///
     /// In body axes (times `R^T`) these are `R^T x` and `-R^T J ((1 + eps) x + R b)`, \[LC\] (31) and (33).
+    ///
+    /// ```
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::Matrix2;
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{OutputMismatch, PlanarPair};
+    /// use nalgebra::Vector2;
+    ///
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// let mut chi = SE2::identity();
+    /// chi.position = Vector2::new(30.0, 40.0);
+    /// let points = PlanarPair::new([fix(30.0), fix(30.0)]);
+    /// // The second source sees the scale, the first does not; a third is not there.
+    /// let of = |source| OutputMismatch::MeasurementScale { source }.columns(&points, &chi);
+    /// assert_eq!(of(1).as_slice()[0].as_slice(), [0.0, 0.0, 30.0, 40.0]);
+    /// assert_eq!(of(2).as_slice()[0].norm(), 0.0);
+    /// ```
     pub fn columns<G, const D: usize, const K: usize, const N: usize, const M: usize>(
         &self,
         points: &Points<K, N, M>,

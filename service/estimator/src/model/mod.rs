@@ -6,6 +6,24 @@
 //! holds the sensors. [`mismatch`] and [`inertial_mismatch`] say how the models may be wrong, as the columns of
 //! \[LC\], [`process`] sums those of the motion; [`augmented`] and [`unknowns`] carry the same mismatches of
 //! odometry as states.
+//!
+//! ```
+//! use inekf::lie::{LieGroup, SE23};
+//! use inekf::model::{Discretisation, ImuInput, ImuStep, Observation, PositionObservation};
+//! use nalgebra::{Matrix3, Vector3};
+//!
+//! // What moves the state: two seconds of 1 m/s^2 ahead, from rest.
+//! let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(1.0, 0.0, 9.80665) };
+//! let g_w = Vector3::new(0.0, 0.0, -9.80665);
+//! let chi = ImuStep::new(&push, &g_w, 2.0, Discretisation::ZeroOrderHold).apply(&SE23::identity());
+//! // And what observes it, half a metre farther than that.
+//! let fix = PositionObservation {
+//!     position_w: Vector3::new(2.5, 0.0, 0.0),
+//!     covariance_w: Matrix3::identity(),
+//!     lever_arm_b: Vector3::zeros(),
+//! };
+//! assert!((fix.residual(&chi) - Vector3::new(0.5, 0.0, 0.0)).norm() < 1e-12);
+//! ```
 
 pub mod augmented;
 pub mod drift;

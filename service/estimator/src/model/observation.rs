@@ -30,10 +30,42 @@ pub mod points;
 /// ```
 pub trait Observation<G: LieGroup<D>, const D: usize, const M: usize> {
     /// `y - h(chi)`, M.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{HeadingObservation, Observation};
+    ///
+    /// // The short way round: from -3.1 to 3.1 rad it is a little to the right.
+    /// let chi = SE23 { rotation: inekf::lie::SO3::exp(&nalgebra::Vector3::new(0.0, 0.0, -3.1)), ..SE23::identity() };
+    /// let residual = HeadingObservation { heading: 3.1, sigma: 0.1 }.residual(&chi);
+    /// assert!((residual.x - (6.2 - core::f64::consts::TAU)).abs() < 1e-12);
+    /// ```
     fn residual(&self, chi: &G) -> SVector<f64, M>;
     /// H, M x D, of the left-invariant error at `chi`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23, SO3};
+    /// use inekf::model::{Observation, VelocityObservation};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// // The error is in body axes and the residual in those of the world: R, in the place of the velocity.
+    /// let chi = SE23 { rotation: SO3::exp(&Vector3::new(0.3, -0.5, 0.8)), ..SE23::identity() };
+    /// let fix = VelocityObservation { velocity_w: Vector3::zeros(), covariance_w: Matrix3::identity() };
+    /// let h = fix.left_jacobian(&chi);
+    /// assert_eq!(h.fixed_view::<3, 3>(0, 3), chi.rotation.matrix());
+    /// assert_eq!(h.fixed_view::<3, 3>(0, 6).norm(), 0.0);
+    /// ```
     fn left_jacobian(&self, chi: &G) -> SMatrix<f64, M, D>;
     /// Covariance of the noise, M x M, symmetric positive definite.
+    ///
+    /// ```
+    /// use inekf::lie::SE23;
+    /// use inekf::model::{HeadingObservation, Observation};
+    ///
+    /// // A variance, where the sensor is described by its standard deviation.
+    /// let noise = Observation::<SE23, 9, 1>::noise(&HeadingObservation { heading: 0.2, sigma: 0.1 });
+    /// assert!((noise.x - 0.01).abs() < 1e-15);
+    /// ```
     fn noise(&self) -> SMatrix<f64, M, M>;
 }
 

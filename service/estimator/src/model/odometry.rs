@@ -32,6 +32,16 @@ pub struct OdometryStep<G> {
 impl<G> OdometryStep<G> {
     /// The step over `dt_s` seconds with the increment `(rotation vector, translation)`, rad and m, in the
     /// body frame at its start: `(theta, x, y)` in the plane.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// // The translation is in the frame of the start: the turn does not bend it.
+    /// let step = OdometryStep::<SE2>::new(&Vector3::new(1.0, 2.0, 0.0), 0.1);
+    /// assert_eq!(step.apply(&SE2::identity()).position, Vector2::new(2.0, 0.0));
+    /// ```
     pub fn new<const D: usize, const N: usize>(increment: &SVector<f64, D>, dt_s: f64) -> Self
     where
         G: RigidPose<D, N>,

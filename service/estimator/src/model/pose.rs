@@ -26,22 +26,75 @@ pub trait Pose<const D: usize, const N: usize>: LieGroup<D> {
     const POSITION: usize;
 
     /// Position, m, world frame.
+    ///
+    /// ```
+    /// use inekf::lie::SE2;
+    /// use inekf::model::{Pose, RigidPose};
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// let north = SE2::from_increment(&Vector3::new(90_f64.to_radians(), 3.0, 1.0));
+    /// assert_eq!(north.position_w(), Vector2::new(3.0, 1.0));
+    /// ```
     fn position_w(&self) -> SVector<f64, N>;
 
     /// Rotation matrix, body to world.
+    ///
+    /// ```
+    /// use inekf::lie::SE2;
+    /// use inekf::model::{Pose, RigidPose};
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// let north = SE2::from_increment(&Vector3::new(90_f64.to_radians(), 3.0, 1.0));
+    /// // What is ahead of a vehicle that faces north lies north.
+    /// assert!((north.rotation_matrix() * Vector2::x() - Vector2::y()).norm() < 1e-12);
+    /// ```
     fn rotation_matrix(&self) -> SMatrix<f64, N, N>;
 
     /// `d Exp(phi) b / d phi` at zero, in the columns of the rotation; zero elsewhere.
+    ///
+    /// ```
+    /// use inekf::lie::SE2;
+    /// use inekf::model::Pose;
+    /// use nalgebra::Vector2;
+    ///
+    /// // A point ahead moves to the left when the body turns to the left, by its distance.
+    /// let jacobian = <SE2 as Pose<3, 2>>::lever_jacobian(&Vector2::new(4.0, 0.0));
+    /// assert_eq!(jacobian.column(0), Vector2::new(0.0, 4.0));
+    /// ```
     fn lever_jacobian(lever_arm_b: &SVector<f64, N>) -> SMatrix<f64, N, D>;
 
     /// `scale x + R b`, m, world frame: where a sensor with this scale sees the point `b` of the body
     /// (\[LC\] (25), `scale = 1 + eps`).
+    ///
+    /// ```
+    /// use inekf::lie::SE2;
+    /// use inekf::model::{Pose, RigidPose};
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// let north = SE2::from_increment(&Vector3::new(90_f64.to_radians(), 3.0, 1.0));
+    /// // A sensor whose scale is off by a tenth sees the position so, and not the lever.
+    /// let seen = north.point_w(&Vector2::new(4.0, 0.0), 1.1);
+    /// assert!((seen - (north.position_w() * 1.1 + Vector2::new(0.0, 4.0))).norm() < 1e-12);
+    /// ```
     fn point_w(&self, lever_arm_b: &SVector<f64, N>, scale: f64) -> SVector<f64, N> {
         self.position_w() * scale + self.rotation_matrix() * lever_arm_b
     }
 
     /// The derivative of [`point_w`](Self::point_w) in the left-invariant error, N x D:
     /// `R [J b, scale I]`, or `R [-hat(b), scale I]`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Pose, RigidPose};
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// let north = SE2::from_increment(&Vector3::new(90_f64.to_radians(), 3.0, 1.0));
+    /// let (lever_arm_b, xi) = (Vector2::new(4.0, 1.0), Vector3::new(1.0, -2.0, 0.5) * 1e-6);
+    /// let moved = north * SE2::exp(&xi);
+    /// let change = moved.point_w(&lever_arm_b, 1.0) - north.point_w(&lever_arm_b, 1.0);
+    /// // To first order: what is left is of the second.
+    /// assert!((change - north.point_jacobian(&lever_arm_b, 1.0) * xi).norm() < 1e-10);
+    /// ```
     fn point_jacobian(&self, lever_arm_b: &SVector<f64, N>, scale: f64) -> SMatrix<f64, N, D> {
         let r_wb = self.rotation_matrix();
         let mut h = r_wb * Self::lever_jacobian(lever_arm_b);
@@ -68,9 +121,31 @@ pub trait Pose<const D: usize, const N: usize>: LieGroup<D> {
 pub trait RigidPose<const D: usize, const N: usize>: Pose<D, N> {
     /// `(Exp(phi), u)` of the increment `(phi, u)`: rotation vector in radians, translation in metres, in the
     /// body frame at the start of the step. The translation is taken literally, which `exp` would not.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Pose, RigidPose};
+    /// use nalgebra::Vector3;
+    ///
+    /// let increment = Vector3::new(1.0, 2.0, 0.0);
+    /// // exp goes along an arc, and arrives elsewhere with the same heading.
+    /// let (literal, along_arc) = (SE2::from_increment(&increment), SE2::exp(&increment));
+    /// assert_eq!(literal.rotation, along_arc.rotation);
+    /// assert!((literal.position_w() - along_arc.position_w()).norm() > 0.5);
+    /// ```
     fn from_increment(increment: &SVector<f64, D>) -> Self;
 
     /// The same rotation at another position, m, world frame.
+    ///
+    /// ```
+    /// use inekf::lie::SE2;
+    /// use inekf::model::{Pose, RigidPose};
+    /// use nalgebra::{Vector2, Vector3};
+    ///
+    /// let north = SE2::from_increment(&Vector3::new(90_f64.to_radians(), 3.0, 1.0));
+    /// let elsewhere = north.with_position_w(&Vector2::zeros());
+    /// assert_eq!((elsewhere.rotation, elsewhere.position_w()), (north.rotation, Vector2::zeros()));
+    /// ```
     fn with_position_w(&self, position_w: &SVector<f64, N>) -> Self;
 }
 

@@ -22,6 +22,18 @@ use super::lines::{INPUTS, Lines, POSE};
 use crate::lanes::{Block, Pair};
 
 /// F and the shape of Q of one interval, in the error of one side.
+///
+/// ```
+/// use inekf::model::{Discretisation, ImuIncrement, ImuInput};
+/// use nalgebra::Vector3;
+///
+/// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+/// // At rest and level, seen from the body: the force that holds it up goes the wrong way with a wrong tilt.
+/// let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: -g_w };
+/// let transition = ImuIncrement::new(&at_rest, &g_w, 0.5, Discretisation::ZeroOrderHold).left_transition();
+/// let [c_1, c_2] = transition.couplings;
+/// assert!((c_1 - g_w * 0.5).norm() < 1e-12 && (c_2 - g_w * 0.125).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transition {
     /// Length of the interval, s.
@@ -41,6 +53,23 @@ pub struct Transition {
 impl Transition {
     /// Where the error `xi` is after the interval, if the input was off by `disturbance` (rad/s, m/s^2): `F xi + B d`
     /// on the pose, as a bias of minus that size would move it; biases stay. D = 9 or 15.
+    ///
+    /// ```
+    /// use inekf::model::{Discretisation, ImuIncrement, ImuInput};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let push = ImuInput { omega_b: Vector3::new(0.1, 0.2, 0.5), force_b: Vector3::new(1.0, 0.0, 9.8) };
+    /// let increment = ImuIncrement::new(&push, &g_w, 0.1, Discretisation::ZeroOrderHold);
+    /// // A bias of the state is an input that was off by as much the other way.
+    /// let mut biased = SVector::<f64, 15>::zeros();
+    /// biased[9] = 0.01;
+    /// let none = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::zeros() };
+    /// let off = ImuInput { omega_b: Vector3::new(-0.01, 0.0, 0.0), ..none };
+    /// let by_bias = increment.left_transition().moved(&biased, &none);
+    /// let by_input = increment.left_transition().moved(&SVector::<f64, 9>::zeros(), &off);
+    /// assert!((by_bias.fixed_rows::<9>(0) - by_input).norm() < 1e-15);
+    /// ```
     pub fn moved<const D: usize>(
         &self,
         xi: &SVector<f64, D>,

@@ -68,6 +68,15 @@ pub struct AugmentedStep<G, const D: usize> {
 impl Unknowns {
     /// These mismatches, in N dimensions, as P parameters. `None` if they have more parameters than P, or are more
     /// than [`MAX_PROCESS_MISMATCHES`] and [`MAX_OUTPUT_MISMATCHES`].
+    ///
+    /// ```
+    /// use inekf::model::{OutputMismatch, Unknowns};
+    ///
+    /// // A turn about any axis is one parameter in the plane, and three in space.
+    /// let turn = OutputMismatch::MeasurementRotation { source: 0, axis_w: None };
+    /// assert!(Unknowns::new::<2, 1>(&[], &[turn]).is_some());
+    /// assert!(Unknowns::new::<3, 1>(&[], &[turn]).is_none());
+    /// ```
     pub fn new<const N: usize, const P: usize>(
         process: &[ProcessMismatch],
         outputs: &[OutputMismatch],
@@ -78,6 +87,17 @@ impl Unknowns {
     /// The declared mismatches as P parameters, and the standard deviation of each parameter: zero where a place is
     /// left over. `None` as in [`new`](Self::new), or if a sigma is not a finite number: of what is unknown
     /// altogether there is no state, only a constraint.
+    ///
+    /// ```
+    /// use inekf::model::{Declared, ProcessMismatch, Unknowns};
+    ///
+    /// let soft = Declared::soft(ProcessMismatch::OdometryScale, 0.05);
+    /// let (_, sigmas) = Unknowns::declared::<2, 3>(&[soft], &[]).expect("one of three");
+    /// // Two places are left over, and mean nothing.
+    /// assert_eq!(sigmas.as_slice(), [0.05, 0.0, 0.0]);
+    /// // Of what is unknown altogether there is no state.
+    /// assert!(Unknowns::declared::<2, 3>(&[Declared::hard(ProcessMismatch::OdometryScale)], &[]).is_none());
+    /// ```
     pub fn declared<const N: usize, const P: usize>(
         process: &[Declared<ProcessMismatch>],
         outputs: &[Declared<OutputMismatch>],
@@ -124,6 +144,14 @@ impl Unknowns {
     }
 
     /// Whether the parameter at `index` is one of the process: of the motion, not of a measurement.
+    ///
+    /// ```
+    /// use inekf::model::{OutputMismatch, ProcessMismatch, Unknowns};
+    ///
+    /// let scale_of = |source| OutputMismatch::MeasurementScale { source };
+    /// let unknowns = Unknowns::new::<2, 2>(&[ProcessMismatch::OdometryScale], &[scale_of(0)]).expect("two");
+    /// assert!(unknowns.is_of_motion(0) && !unknowns.is_of_motion(1));
+    /// ```
     pub fn is_of_motion(&self, index: usize) -> bool {
         index < self.process().count()
     }
@@ -134,6 +162,19 @@ impl Unknowns {
     }
 
     /// The step that the measured `step` is, seen from `state`, and its transition matrix.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Augmented, OdometryStep, ProcessMismatch, Unknowns};
+    /// use nalgebra::{Vector1, Vector3};
+    ///
+    /// // A gyro that shows 0.1 rad/s too little: what looked like straight on was a turn.
+    /// let bias = ProcessMismatch::OdometryRotationBias { axis: 0 };
+    /// let unknowns = Unknowns::new::<2, 1>(&[bias], &[]).expect("one");
+    /// let state = Augmented::<SE2, 3, 1, 4>::new(SE2::identity(), Vector1::new(0.1));
+    /// let actual = unknowns.step(&OdometryStep::new(&Vector3::new(0.0, 10.0, 0.0), 2.0), &state);
+    /// assert!((actual.step.kappa.rotation.angle_rad() - 0.2).abs() < 1e-12);
+    /// ```
     pub fn step<G, const B: usize, const P: usize, const D: usize, const N: usize>(
         &self,
         step: &OdometryStep<G>,
@@ -191,6 +232,28 @@ impl Unknowns {
     }
 
     /// `points` as an augmented state sees them.
+    ///
+    /// ```
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Augmented, Observation, OutputMismatch, PlanarFix, Unknowns};
+    /// use nalgebra::Vector1;
+    ///
+    /// let scale_of = |source| OutputMismatch::MeasurementScale { source };
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// let unknowns = Unknowns::new::<2, 1>(&[], &[scale_of(0)]).expect("one");
+    /// let mut state = Augmented::<SE2, 3, 1, 4>::new(SE2::identity(), Vector1::new(0.1));
+    /// state.pose.position.x = 10.0;
+    /// // A source that is thought to show a tenth too much, ten metres away: what shows eleven fits.
+    /// let seen = unknowns.observe(PlanarFix::new([fix(11.0)]));
+    /// assert!(seen.residual(&state).norm() < 1e-12);
+    /// ```
     pub fn observe<const K: usize, const N: usize, const M: usize>(
         &self,
         points: Points<K, N, M>,
@@ -200,6 +263,28 @@ impl Unknowns {
 
     /// `points` of the sources from `first_source` on, as an augmented state sees them: for sources that come
     /// one at a time.
+    ///
+    /// ```
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Augmented, Observation, OutputMismatch, PlanarFix, Unknowns};
+    /// use nalgebra::Vector1;
+    ///
+    /// let scale_of = |source| OutputMismatch::MeasurementScale { source };
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// let unknowns = Unknowns::new::<2, 1>(&[], &[scale_of(1)]).expect("one");
+    /// let mut state = Augmented::<SE2, 3, 1, 4>::new(SE2::identity(), Vector1::new(0.1));
+    /// state.pose.position.x = 10.0;
+    /// // A fix of the second source, which is the one that is off.
+    /// let seen = unknowns.observe_from(1, PlanarFix::new([fix(11.0)]));
+    /// assert!(seen.residual(&state).norm() < 1e-12);
+    /// ```
     pub fn observe_from<const K: usize, const N: usize, const M: usize>(
         &self,
         first_source: usize,
@@ -209,6 +294,28 @@ impl Unknowns {
     }
 
     /// `points` of these sources, as an augmented state sees them.
+    ///
+    /// ```
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::{Augmented, Observation, OutputMismatch, PlanarPair, Unknowns};
+    /// use nalgebra::Vector1;
+    ///
+    /// let scale_of = |source| OutputMismatch::MeasurementScale { source };
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// let unknowns = Unknowns::new::<2, 1>(&[], &[scale_of(2)]).expect("one");
+    /// let mut state = Augmented::<SE2, 3, 1, 4>::new(SE2::identity(), Vector1::new(0.1));
+    /// state.pose.position.x = 10.0;
+    /// // The third source and the first, at one time: the third is off.
+    /// let seen = unknowns.observe_by([2, 0], PlanarPair::new([fix(11.0), fix(10.0)]));
+    /// assert!(seen.residual(&state).norm() < 1e-12);
+    /// ```
     pub fn observe_by<const K: usize, const N: usize, const M: usize>(
         &self,
         sources: [usize; K],
@@ -223,6 +330,28 @@ impl Unknowns {
 }
 
 /// Position fixes whose mismatches are in the state.
+///
+/// ```
+/// # use inekf::model::PointFix;
+/// # use nalgebra::Matrix2;
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::{Augmented, Observation, OutputMismatch, PlanarFix, Unknowns};
+/// use nalgebra::{Vector1, Vector2};
+///
+/// let scale_of = |source| OutputMismatch::MeasurementScale { source };
+/// # let fix = |x_m: f64| PointFix {
+/// #     position_w: Vector2::new(x_m, 0.0),
+/// #     covariance_w: Matrix2::identity(),
+/// #     lever_arm_b: Vector2::zeros(),
+/// #     scale_error: 0.0,
+/// # };
+/// let unknowns = Unknowns::new::<2, 1>(&[], &[scale_of(0)]).expect("one");
+/// let mut state = Augmented::<SE2, 3, 1, 4>::new(SE2::identity(), Vector1::new(0.0));
+/// state.pose.position.x = 10.0;
+/// let seen = unknowns.observe(PlanarFix::new([fix(10.0)]));
+/// // At ten metres a unit of the scale is ten metres, in the column behind the pose.
+/// assert_eq!(seen.left_jacobian(&state).column(3), Vector2::new(10.0, 0.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AugmentedPoints<const K: usize, const N: usize, const M: usize> {
     points: Points<K, N, M>,

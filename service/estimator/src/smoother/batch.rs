@@ -31,6 +31,163 @@ use crate::model::Observation;
 /// let papers = BatchOptions { jacobians: Jacobians::Frozen, step_control: false, ..BatchOptions::default() };
 /// assert_eq!(papers.iterations, BatchOptions::default().iterations);
 /// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BatchOptions {
+    /// Most Gauss-Newton iterations.
+    pub iterations: usize,
+    /// Iterating stops when no component of any state moves by more than this, rad, m/s and m alike.
+    pub tolerance: f64,
+    /// Which derivatives are used.
+    pub jacobians: Jacobians,
+    /// Whether a step that raises the cost is shortened, by halves.
+    pub step_control: bool,
+}
+
+impl Default for BatchOptions {
+    /// At most 50 exact steps, down to 1e-9, none of which raises the cost.
+    fn default() -> Self {
+        Self {
+            iterations: 50,
+            tolerance: 1e-9,
+            jacobians: Jacobians::Exact,
+            step_control: true,
+        }
+    }
+}
+
+/// One Gauss-Newton iteration.
+///
+/// ```
+/// # use inekf::model::{PlanarFix, PointFix};
+/// # use inekf::smoother::SmootherError;
+/// # use nalgebra::{Matrix2, Vector2};
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use inekf::smoother::{Batch, BatchOptions, Chain};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+/// #     position_w: Vector2::new(x_m, 0.0),
+/// #     covariance_w: Matrix2::identity(),
+/// #     lever_arm_b: Vector2::zeros(),
+/// #     scale_error: 0.0,
+/// # }]);
+/// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let mut chain = Chain::with_capacity(prior, 2, 1);
+/// chain.advance(ahead, Matrix3::identity() * 0.01);
+/// chain.observe(seen(2.0));
+/// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+/// batch.dead_reckon(&chain);
+/// let step = batch.iterate(&chain, &BatchOptions::default())?;
+/// // A metre farther than expected, half of it believed; the whole step lowered the cost.
+/// assert!((step.largest - 0.5).abs() < 0.01 && step.share == 1.0);
+/// # Ok::<(), SmootherError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// The largest component by which a state moved, rad, m/s and m alike.
+    pub largest: f64,
+    /// The share of the full step that was taken; 0 where no share of it lowers the cost.
+    pub share: f64,
+}
+
+/// What smoothing did.
+///
+/// ```
+/// # use inekf::model::{PlanarFix, PointFix};
+/// # use inekf::smoother::SmootherError;
+/// # use nalgebra::{Matrix2, Vector2};
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use inekf::smoother::{Batch, BatchOptions, Chain};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+/// #     position_w: Vector2::new(x_m, 0.0),
+/// #     covariance_w: Matrix2::identity(),
+/// #     lever_arm_b: Vector2::zeros(),
+/// #     scale_error: 0.0,
+/// # }]);
+/// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let mut chain = Chain::with_capacity(prior, 2, 1);
+/// chain.advance(ahead, Matrix3::identity() * 0.01);
+/// chain.observe(seen(2.0));
+/// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+/// batch.dead_reckon(&chain);
+/// let options = BatchOptions { iterations: 1, ..BatchOptions::default() };
+/// // One iteration: whether it was the last is not known. Then it is.
+/// assert!(!batch.smooth(&chain, &options)?.converged);
+/// assert!(batch.smooth(&chain, &options)?.converged);
+/// # Ok::<(), SmootherError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Smoothed {
+    /// Iterations done.
+    pub iterations: usize,
+    /// Whether the last step was below the tolerance.
+    pub converged: bool,
+}
+
+/// The minus log-likelihood of a trajectory, times two and up to a constant.
+///
+/// ```
+/// # use inekf::model::{PlanarFix, PointFix};
+/// # use inekf::smoother::SmootherError;
+/// # use nalgebra::{Matrix2, Vector2};
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use inekf::smoother::{Batch, Chain};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+/// #     position_w: Vector2::new(x_m, 0.0),
+/// #     covariance_w: Matrix2::identity(),
+/// #     lever_arm_b: Vector2::zeros(),
+/// #     scale_error: 0.0,
+/// # }]);
+/// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let mut chain = Chain::with_capacity(prior, 2, 1);
+/// chain.advance(ahead, Matrix3::identity() * 0.01);
+/// chain.observe(seen(2.0));
+/// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+/// // Half a metre to the side of where the odometry leads, which it knows to 0.1 m; and a metre off the fix, known to 1 m.
+/// let mut aside = ahead.apply(&SE2::identity());
+/// aside.position.y = 0.5;
+/// batch.set_states(&[SE2::identity(), aside]);
+/// let cost = batch.cost(&chain)?;
+/// assert!((cost.square - (25.0 + 1.0 + 0.25)).abs() < 1e-9 && cost.outside == 0.0);
+/// # Ok::<(), SmootherError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cost {
+    /// The sum of the squared deviations, each in its own standard deviations.
+    pub square: f64,
+    /// The largest deviation that no noise explains: of a link without noise, or outside the prior; rad, m/s or m.
+    pub outside: f64,
+}
+
+/// What counts as no deviation at all where no noise explains one, rad, m/s and m.
+const FEASIBLE: f64 = 1e-9;
+
+/// How much larger a cost may come out by rounding, relative: the residual of an almost noise-free link is
+/// rounding, divided by a tiny standard deviation.
+const COST_ROUNDING: f64 = 1e-9;
+
+/// How many shares of a step are tried, each half of the one before.
+const MAX_TRIALS: usize = 11;
+
+/// A trajectory, and the room to smooth it in.
+///
+/// G is the group, S the parametrisation, D the dimension of the group, M that of an observation.
 ///
 /// ```
 /// use inekf::filter::{Belief, Covariance, Left};
@@ -60,70 +217,6 @@ use crate::model::Observation;
 /// assert!((last.position.x - first.position.x - 1.0).abs() < 1e-9);
 /// # Ok::<(), inekf::smoother::SmootherError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BatchOptions {
-    /// Most Gauss-Newton iterations.
-    pub iterations: usize,
-    /// Iterating stops when no component of any state moves by more than this, rad, m/s and m alike.
-    pub tolerance: f64,
-    /// Which derivatives are used.
-    pub jacobians: Jacobians,
-    /// Whether a step that raises the cost is shortened, by halves.
-    pub step_control: bool,
-}
-
-impl Default for BatchOptions {
-    /// At most 50 exact steps, down to 1e-9, none of which raises the cost.
-    fn default() -> Self {
-        Self {
-            iterations: 50,
-            tolerance: 1e-9,
-            jacobians: Jacobians::Exact,
-            step_control: true,
-        }
-    }
-}
-
-/// One Gauss-Newton iteration.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
-    /// The largest component by which a state moved, rad, m/s and m alike.
-    pub largest: f64,
-    /// The share of the full step that was taken; 0 where no share of it lowers the cost.
-    pub share: f64,
-}
-
-/// What smoothing did.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Smoothed {
-    /// Iterations done.
-    pub iterations: usize,
-    /// Whether the last step was below the tolerance.
-    pub converged: bool,
-}
-
-/// The minus log-likelihood of a trajectory, times two and up to a constant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cost {
-    /// The sum of the squared deviations, each in its own standard deviations.
-    pub square: f64,
-    /// The largest deviation that no noise explains: of a link without noise, or outside the prior; rad, m/s or m.
-    pub outside: f64,
-}
-
-/// What counts as no deviation at all where no noise explains one, rad, m/s and m.
-const FEASIBLE: f64 = 1e-9;
-
-/// How much larger a cost may come out by rounding, relative: the residual of an almost noise-free link is
-/// rounding, divided by a tiny standard deviation.
-const COST_ROUNDING: f64 = 1e-9;
-
-/// How many shares of a step are tried, each half of the one before.
-const MAX_TRIALS: usize = 11;
-
-/// A trajectory, and the room to smooth it in.
-///
-/// G is the group, S the parametrisation, D the dimension of the group, M that of an observation.
 #[derive(Clone, Debug)]
 pub struct Batch<G, S, const D: usize, const M: usize> {
     states: Vec<G>,
@@ -134,6 +227,14 @@ pub struct Batch<G, S, const D: usize, const M: usize> {
 
 impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> {
     /// An empty trajectory, with room for this many states and observations. More grow the room, which allocates.
+    ///
+    /// ```
+    /// use inekf::filter::Left;
+    /// use inekf::lie::SE2;
+    /// use inekf::smoother::Batch;
+    ///
+    /// assert!(Batch::<SE2, Left, 3, 2>::with_capacity(100, 10).states().is_empty());
+    /// ```
     pub fn with_capacity(states: usize, observations: usize) -> Self {
         Self {
             states: Vec::with_capacity(states),
@@ -144,11 +245,70 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
     }
 
     /// The trajectory, oldest state first.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use inekf::smoother::SmootherError;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use inekf::smoother::{Batch, BatchOptions, Chain};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let mut chain = Chain::with_capacity(prior, 2, 1);
+    /// chain.advance(ahead, Matrix3::identity() * 0.01);
+    /// chain.observe(seen(2.0));
+    /// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+    /// batch.dead_reckon(&chain);
+    /// batch.smooth(&chain, &BatchOptions::default())?;
+    /// let [first, last] = batch.states() else { panic!("two states") };
+    /// // A fix of the last tells of the first as well: the odometry between them is good.
+    /// assert!(first.position.x > 0.4 && last.position.x > 1.4);
+    /// # Ok::<(), SmootherError>(())
+    /// ```
     pub fn states(&self) -> &[G] {
         &self.states
     }
 
     /// Takes `states` as the trajectory.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use inekf::smoother::{Batch, BatchOptions, Chain, SmootherError};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let mut chain = Chain::with_capacity(prior, 2, 1);
+    /// chain.advance(ahead, Matrix3::identity() * 0.01);
+    /// chain.observe(seen(2.0));
+    /// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+    /// // The chain has two states.
+    /// batch.set_states(&[SE2::identity()]);
+    /// let refused = batch.smooth(&chain, &BatchOptions::default());
+    /// assert_eq!(refused, Err(SmootherError::WrongLength { states: 1, expected: 2 }));
+    /// ```
     pub fn set_states(&mut self, states: &[G]) {
         self.states.clear();
         self.states.extend_from_slice(states);
@@ -156,11 +316,69 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
 
     /// Covariance of the left-invariant error of the newest state given all observations, where the last iteration
     /// linearised.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use inekf::smoother::SmootherError;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use inekf::smoother::{Batch, BatchOptions, Chain};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let mut chain = Chain::with_capacity(prior, 2, 1);
+    /// chain.advance(ahead, Matrix3::identity() * 0.01);
+    /// chain.observe(seen(2.0));
+    /// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+    /// batch.dead_reckon(&chain);
+    /// batch.smooth(&chain, &BatchOptions::default())?;
+    /// // 1 of the prior and 0.01 of the motion, beside 1 of the fix.
+    /// let variance = batch.newest_covariance().matrix()[(1, 1)];
+    /// assert!((variance - 1.01 / 2.01).abs() < 1e-9);
+    /// # Ok::<(), SmootherError>(())
+    /// ```
     pub fn newest_covariance(&self) -> &Covariance<D> {
         &self.solver.newest().covariance
     }
 
     /// Takes the prior's mean, moved without noise, as the trajectory.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use inekf::smoother::{Batch, Chain};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let mut chain = Chain::with_capacity(prior, 2, 1);
+    /// chain.advance(ahead, Matrix3::identity() * 0.01);
+    /// chain.observe(seen(2.0));
+    /// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+    /// batch.dead_reckon(&chain);
+    /// // The observations have no say.
+    /// assert_eq!(batch.states(), [SE2::identity(), ahead.apply(&SE2::identity())]);
+    /// ```
     pub fn dead_reckon<P, T, O>(&mut self, chain: &Chain<G, P, T, O, D>)
     where
         T: Motion<G, D>,
@@ -178,6 +396,38 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
     ///
     /// # Errors
     /// [`SmootherError`]; the trajectory is then that of the last iteration that succeeded.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use inekf::smoother::SmootherError;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use inekf::smoother::{Batch, BatchOptions, Chain};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let mut chain = Chain::with_capacity(prior, 2, 1);
+    /// chain.advance(ahead, Matrix3::identity() * 0.01);
+    /// chain.observe(seen(2.0));
+    /// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+    /// batch.dead_reckon(&chain);
+    /// let before = batch.cost(&chain)?;
+    /// assert!(batch.smooth(&chain, &BatchOptions::default())?.converged);
+    /// assert!(batch.cost(&chain)?.square < before.square);
+    /// // Between what the odometry says, a metre, and the fix: weighed by their variances.
+    /// assert!((batch.states()[1].position.x - (1.0 + 1.01 / 2.01)).abs() < 1e-9);
+    /// # Ok::<(), SmootherError>(())
+    /// ```
     pub fn smooth<P, T, O>(
         &mut self,
         chain: &Chain<G, P, T, O, D>,
@@ -212,6 +462,37 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
     ///
     /// # Errors
     /// [`SmootherError`]; the trajectory is then unchanged.
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use inekf::smoother::SmootherError;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use inekf::smoother::{Batch, BatchOptions, Chain};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let mut chain = Chain::with_capacity(prior, 2, 1);
+    /// chain.advance(ahead, Matrix3::identity() * 0.01);
+    /// chain.observe(seen(2.0));
+    /// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+    /// batch.dead_reckon(&chain);
+    /// let options = BatchOptions::default();
+    /// batch.iterate(&chain, &options)?;
+    /// // Straight on the problem is linear: the second iteration has nothing left to do.
+    /// assert!(batch.iterate(&chain, &options)?.largest < 1e-9);
+    /// # Ok::<(), SmootherError>(())
+    /// ```
     pub fn iterate<P, T, O>(
         &mut self,
         chain: &Chain<G, P, T, O, D>,
@@ -299,6 +580,35 @@ impl<G: LieGroup<D>, S: Side, const D: usize, const M: usize> Batch<G, S, D, M> 
     ///
     /// # Errors
     /// [`SmootherError`].
+    ///
+    /// ```
+    /// # use inekf::model::{PlanarFix, PointFix};
+    /// # use inekf::smoother::SmootherError;
+    /// # use nalgebra::{Matrix2, Vector2};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::OdometryStep;
+    /// use inekf::smoother::{Batch, Chain};
+    /// use nalgebra::{Matrix3, Vector3};
+    ///
+    /// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # }]);
+    /// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+    /// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+    /// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+    /// let mut chain = Chain::with_capacity(prior, 2, 1);
+    /// chain.advance(ahead, Matrix3::identity() * 0.01);
+    /// chain.observe(seen(2.0));
+    /// let mut batch = Batch::<SE2, Left, 3, 2>::with_capacity(2, 1);
+    /// batch.dead_reckon(&chain);
+    /// // As the prior and the odometry say, a metre off a fix that is known to a metre.
+    /// assert!((batch.cost(&chain)?.square - 1.0).abs() < 1e-12);
+    /// # Ok::<(), SmootherError>(())
+    /// ```
     pub fn cost<P, T, O>(&self, chain: &Chain<G, P, T, O, D>) -> Result<Cost, SmootherError>
     where
         P: Side,

@@ -24,6 +24,26 @@ use crate::lie::LieGroup;
 use crate::model::Observation;
 
 /// Which derivatives of the residuals of the prior and of the links are used.
+///
+/// ```
+/// use inekf::filter::Left;
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use inekf::smoother::Link;
+/// use inekf::smoother::linearise::{Jacobians, motion};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.1, 1.0, 0.0), 1.0);
+/// let link = Link { motion: ahead, noise: Matrix3::identity() };
+/// let (from, reached) = (SE2::identity(), ahead.apply(&SE2::identity()));
+/// let apart = |to: &SE2| {
+///     let of = |jacobians| motion::<SE2, Left, _, 3>(&link, &from, to, jacobians).transition;
+///     (of(Jacobians::Exact) - of(Jacobians::Frozen)).norm()
+/// };
+/// // They agree where the motion leads, and differ by as much as the state is elsewhere.
+/// assert!(apart(&reached) < 1e-12);
+/// assert!(apart(&(reached * SE2::exp(&Vector3::new(0.5, 0.0, 0.0)))) > 0.1);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Jacobians {
     /// The true ones: Gauss-Newton on the cost as it is.
@@ -34,6 +54,35 @@ pub enum Jacobians {
 }
 
 /// The prior around `chi`.
+///
+/// ```
+/// # use inekf::model::{PlanarFix, PointFix};
+/// # use nalgebra::{Matrix2, Vector2};
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use inekf::smoother::Chain;
+/// use inekf::smoother::linearise::{self, Jacobians};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+/// #     position_w: Vector2::new(x_m, 0.0),
+/// #     covariance_w: Matrix2::identity(),
+/// #     lever_arm_b: Vector2::zeros(),
+/// #     scale_error: 0.0,
+/// # }]);
+/// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let mut chain = Chain::with_capacity(prior, 2, 1);
+/// chain.advance(ahead, Matrix3::identity() * 0.01);
+/// chain.observe(seen(2.0));
+///
+/// // The error of a trajectory that begins half a metre too far: the prior wants it back.
+/// let chi = SE2::exp(&Vector3::new(0.0, 0.5, 0.0));
+/// let wanted = linearise::prior(&prior, &chi, Jacobians::Exact);
+/// assert!((wanted.mean - Vector3::new(0.0, -0.5, 0.0)).norm() < 1e-12);
+/// ```
 pub fn prior<G: LieGroup<D>, P: Side, const D: usize>(
     belief: &Belief<G, P, D>,
     chi: &G,
@@ -61,6 +110,39 @@ pub fn prior<G: LieGroup<D>, P: Side, const D: usize>(
 }
 
 /// The link from `from` to `to`, with its residual in the chart of S.
+///
+/// ```
+/// # use inekf::model::{PlanarFix, PointFix};
+/// # use nalgebra::{Matrix2, Vector2};
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use inekf::smoother::Chain;
+/// use inekf::smoother::linearise::{self, Jacobians};
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+/// #     position_w: Vector2::new(x_m, 0.0),
+/// #     covariance_w: Matrix2::identity(),
+/// #     lever_arm_b: Vector2::zeros(),
+/// #     scale_error: 0.0,
+/// # }]);
+/// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let mut chain = Chain::with_capacity(prior, 2, 1);
+/// chain.advance(ahead, Matrix3::identity() * 0.01);
+/// chain.observe(seen(2.0));
+///
+/// let (from, link) = (SE2::identity(), &chain.links()[0]);
+/// let linear = |to: &SE2| linearise::motion::<SE2, Left, _, 3>(link, &from, to, Jacobians::Exact);
+/// // Where the motion leads, the errors are those that it makes.
+/// let reached = ahead.apply(&from);
+/// assert!(linear(&reached).offset.norm() < 1e-12);
+/// // Half a metre beyond, they have to take it back.
+/// let beyond = reached * SE2::exp(&Vector3::new(0.0, 0.5, 0.0));
+/// assert!((linear(&beyond).offset - Vector3::new(0.0, -0.5, 0.0)).norm() < 1e-12);
+/// ```
 pub fn motion<G, S, T, const D: usize>(
     link: &Link<T, D>,
     from: &G,
@@ -103,7 +185,7 @@ where
 
 /// How far `to` is from where `motion` leads from `from`: the residual in the chart of S, in body coordinates, which
 /// are those of the noise.
-pub fn departure<G, S, T, const D: usize>(motion: &T, from: &G, to: &G) -> SVector<f64, D>
+pub(crate) fn departure<G, S, T, const D: usize>(motion: &T, from: &G, to: &G) -> SVector<f64, D>
 where
     G: LieGroup<D>,
     S: Side,
@@ -119,6 +201,34 @@ where
 }
 
 /// The observation around `chi`.
+///
+/// ```
+/// # use inekf::model::{PlanarFix, PointFix};
+/// # use nalgebra::Matrix2;
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE2};
+/// use inekf::model::OdometryStep;
+/// use inekf::smoother::{Chain, linearise};
+/// use nalgebra::{Matrix3, Vector2, Vector3};
+///
+/// # let seen = |x_m: f64| PlanarFix::new([PointFix {
+/// #     position_w: Vector2::new(x_m, 0.0),
+/// #     covariance_w: Matrix2::identity(),
+/// #     lever_arm_b: Vector2::zeros(),
+/// #     scale_error: 0.0,
+/// # }]);
+/// let ahead = OdometryStep::<SE2>::new(&Vector3::new(0.0, 1.0, 0.0), 1.0);
+/// let p = Covariance::from_variances(&Vector3::new(0.01, 1.0, 1.0));
+/// let prior = Belief::<SE2, Left, 3>::new(SE2::identity(), p);
+/// let mut chain = Chain::with_capacity(prior, 2, 1);
+/// chain.advance(ahead, Matrix3::identity() * 0.01);
+/// chain.observe(seen(2.0));
+///
+/// let linear = linearise::measurement(&seen(2.0), &SE2::identity());
+/// // Two metres off; a metre ahead would be a metre less.
+/// assert_eq!(linear.value, Vector2::new(2.0, 0.0));
+/// assert_eq!(linear.jacobian * Vector3::new(0.0, 1.0, 0.0), Vector2::new(1.0, 0.0));
+/// ```
 pub fn measurement<G, O, const D: usize, const M: usize>(
     observation: &O,
     chi: &G,

@@ -94,6 +94,17 @@ fn carried_inputs(xi: &SVector<f64, 9>, b: &SMatrix<f64, 9, 6>) -> SMatrix<f64, 
 
 impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
     /// No motion yet, to be integrated with the biases of `reference`.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::Preintegration;
+    /// use nalgebra::SVector;
+    ///
+    /// // No motion: it leads nowhere.
+    /// let chi = SE23::exp(&SVector::repeat(0.3));
+    /// let (stays, f) = Preintegration::new(&chi).transition(&chi);
+    /// assert!(stays.between(&chi).log().norm() < 1e-12 && f.is_identity(1e-12));
+    /// ```
     pub fn new(reference: &G) -> Self {
         Self {
             reference: G::from_parts(
@@ -115,6 +126,24 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
     }
 
     /// Adds `dt_s` seconds with the raw sample `measured` under gravity `g_w`, m/s^2.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// use inekf::smoother::Preintegration;
+    /// use nalgebra::Vector3;
+    ///
+    /// let zoh = Discretisation::ZeroOrderHold;
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(2.0, 0.0, 9.80665) };
+    /// let mut motion = Preintegration::new(&SE23::identity());
+    /// motion.push(&push, &g_w, 0.5, zoh, &noise);
+    /// motion.push(&push, &g_w, 0.5, zoh, &noise);
+    /// // A second of 2 m/s^2 from rest: 2 m/s and a metre.
+    /// let (moved, _) = motion.transition(&SE23::identity());
+    /// assert!((moved.velocity.x - 2.0).abs() < 1e-12 && (moved.position.x - 1.0).abs() < 1e-12);
+    /// ```
     pub fn push(
         &mut self,
         measured: &ImuInput,
@@ -130,17 +159,66 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
     }
 
     /// Length of the motion, s.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// use inekf::smoother::Preintegration;
+    /// use nalgebra::Vector3;
+    ///
+    /// let zoh = Discretisation::ZeroOrderHold;
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(2.0, 0.0, 9.80665) };
+    /// let mut motion = Preintegration::new(&SE23::identity());
+    /// motion.push(&push, &g_w, 0.5, zoh, &noise);
+    /// motion.push(&push, &g_w, 0.25, zoh, &noise);
+    /// assert_eq!(motion.dt_s(), 0.75);
+    /// ```
     pub fn dt_s(&self) -> f64 {
         self.motion.dt_s
     }
 
     /// The motion as one step, at the biases of the reference. Its body part U holds what is called the
     /// preintegrated measurements, its `input_jacobian` their derivative B by the inputs (that by the biases is -B).
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// use inekf::smoother::Preintegration;
+    /// use nalgebra::Vector3;
+    ///
+    /// let zoh = Discretisation::ZeroOrderHold;
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(2.0, 0.0, 9.80665) };
+    /// let mut motion = Preintegration::new(&SE23::identity());
+    /// motion.push(&push, &g_w, 0.5, zoh, &noise);
+    /// // What the body felt, without gravity: the preintegrated velocity.
+    /// let felt = motion.motion().step.body;
+    /// assert!((felt.velocity - push.force_b * 0.5).norm() < 1e-12);
+    /// ```
     pub fn motion(&self) -> &ImuStep {
         &self.motion
     }
 
     /// Q, D x D, of the left-invariant error: what the noise of all samples adds.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// use inekf::smoother::Preintegration;
+    /// use nalgebra::Vector3;
+    ///
+    /// let zoh = Discretisation::ZeroOrderHold;
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(2.0, 0.0, 9.80665) };
+    /// let mut motion = Preintegration::new(&SE23::identity());
+    /// motion.push(&push, &g_w, 0.5, zoh, &noise);
+    /// // The attitude is a random walk: the density by the time.
+    /// assert!((motion.noise().matrix()[(0, 0)] - noise.gyro_psd * 0.5).abs() < 1e-12);
+    /// ```
     pub fn noise(&self) -> &Covariance<D> {
         &self.noise
     }
@@ -149,6 +227,26 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
     ///
     /// Exact without biases. With them, of first order in what the biases of `chi` differ from the reference;
     /// F is the exact derivative of that.
+    ///
+    /// ```
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// use inekf::smoother::Preintegration;
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let zoh = Discretisation::ZeroOrderHold;
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(2.0, 0.0, 9.80665) };
+    /// let mut motion = Preintegration::new(&SE23::identity());
+    /// motion.push(&push, &g_w, 0.5, zoh, &noise);
+    /// // f(chi exp(xi)) = f(chi) exp(F xi): without biases for an error of any size.
+    /// let chi = SE23::exp(&SVector::repeat(0.3));
+    /// let xi = SVector::<f64, 9>::from_fn(|i, _| 0.2 - 0.04 * i as f64);
+    /// let (moved, f) = motion.transition(&chi);
+    /// let (wrong, _) = motion.transition(&chi.compose(&SE23::exp(&xi)));
+    /// assert!((moved.between(&wrong).log() - f * xi).norm() < 1e-12);
+    /// ```
     pub fn transition(&self, chi: &G) -> (G, SMatrix<f64, D, D>) {
         chi.transition(&self.motion_of(chi))
     }
@@ -169,6 +267,24 @@ impl<G: InertialState<D>, const D: usize> Preintegration<G, D> {
     }
 
     /// `belief` after the motion: `chi = f(chi_hat)`, `P+ = F P F^T + Q`.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// use inekf::smoother::Preintegration;
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let zoh = Discretisation::ZeroOrderHold;
+    /// let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// let push = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(2.0, 0.0, 9.80665) };
+    /// let mut motion = Preintegration::new(&SE23::identity());
+    /// motion.push(&push, &g_w, 0.5, zoh, &noise);
+    /// // Of a state that is known exactly, what is not known afterwards is the noise.
+    /// let exact = Belief::<SE23, Left, 9>::new(SE23::identity(), Covariance::from_variances(&SVector::zeros()));
+    /// assert!((motion.carry(&exact).covariance.matrix() - motion.noise().matrix()).norm() < 1e-15);
+    /// ```
     pub fn carry(&self, belief: &Belief<G, Left, D>) -> Belief<G, Left, D> {
         let (mean, f) = self.transition(&belief.mean);
         let covariance = belief.covariance.transformed(&f).plus(self.noise.matrix());

@@ -27,6 +27,19 @@ use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use crate::filter::Covariance;
 
 /// A normal distribution of D numbers.
+///
+/// ```
+/// use inekf::filter::Covariance;
+/// use inekf::smoother::{Gaussian, Solver};
+/// use nalgebra::Vector1;
+///
+/// let one = Covariance::from_variances(&Vector1::new(1.0));
+/// let known = Gaussian { mean: Vector1::new(0.0), covariance: one };
+/// let mut solver = Solver::<1, 1>::with_capacity(1, 0);
+/// solver.start(&known);
+/// // Where nothing is measured the prior is the answer.
+/// assert_eq!(solver.newest(), &known);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaussian<const D: usize> {
     /// Mean, D.
@@ -36,6 +49,21 @@ pub struct Gaussian<const D: usize> {
 }
 
 /// `xi+ = F xi + a + w`, w of covariance Q.
+///
+/// ```
+/// use inekf::filter::Covariance;
+/// use inekf::smoother::{Gaussian, LinearMotion, Solver};
+/// use nalgebra::{Matrix1, Vector1};
+///
+/// let one = Covariance::from_variances(&Vector1::new(1.0));
+/// let known = Gaussian { mean: Vector1::new(0.0), covariance: one };
+/// let walks = LinearMotion { transition: Matrix1::new(1.0), offset: Vector1::new(0.0), noise: Matrix1::new(3.0) };
+/// let mut solver = Solver::<1, 1>::with_capacity(2, 0);
+/// solver.start(&known);
+/// // A random walk: its variance joins that of the start.
+/// solver.advance(&walks);
+/// assert_eq!(solver.newest().covariance.matrix()[(0, 0)], 1.0 + 3.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearMotion<const D: usize> {
     /// F, D x D.
@@ -47,6 +75,23 @@ pub struct LinearMotion<const D: usize> {
 }
 
 /// `z = H xi + v`, v of covariance N.
+///
+/// ```
+/// # use inekf::smoother::SmootherError;
+/// use inekf::filter::Covariance;
+/// use inekf::smoother::{Gaussian, LinearMeasurement, Solver};
+/// use nalgebra::{Matrix1, Vector1};
+///
+/// let one = Covariance::from_variances(&Vector1::new(1.0));
+/// let known = Gaussian { mean: Vector1::new(0.0), covariance: one };
+/// let seen = LinearMeasurement { value: Vector1::new(5.0), jacobian: Matrix1::new(1.0), noise: Matrix1::new(1.0) };
+/// let mut solver = Solver::<1, 1>::with_capacity(1, 1);
+/// solver.start(&known);
+/// // As well as it was known: half way from 0 to 5.
+/// solver.measure(&seen)?;
+/// assert!((solver.newest().mean.x - 2.5).abs() < 1e-12);
+/// # Ok::<(), SmootherError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearMeasurement<const D: usize, const M: usize> {
     /// z, M.
@@ -112,32 +157,20 @@ impl fmt::Display for SmootherError {
 impl core::error::Error for SmootherError {}
 
 /// The gain of one measurement, and what the way back needs of it. It depends on covariances alone.
-///
-/// ```
-/// use inekf::filter::Covariance;
-/// use inekf::smoother::Gain;
-/// use nalgebra::{Matrix1, RowVector2, Vector2};
-///
-/// let p = Covariance::from_variances(&Vector2::new(3.0, 1.0));
-/// let (gain, after) = Gain::new(&p, &RowVector2::new(1.0, 0.0), &Matrix1::new(1.0)).expect("definite");
-/// // P / (P + N) of what it sees, nothing of what it does not.
-/// assert!((gain.gain - Vector2::new(0.75, 0.0)).norm() < 1e-15);
-/// assert!((after.matrix()[(0, 0)] - 0.75).abs() < 1e-15);
-/// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Gain<const D: usize, const M: usize> {
+struct Gain<const D: usize, const M: usize> {
     /// H, M x D.
-    pub jacobian: SMatrix<f64, M, D>,
+    jacobian: SMatrix<f64, M, D>,
     /// K, D x M.
-    pub gain: SMatrix<f64, D, M>,
+    gain: SMatrix<f64, D, M>,
     /// Cholesky factor of `S = H P H^T + N`.
-    pub innovation: Cholesky<f64, Const<M>>,
+    innovation: Cholesky<f64, Const<M>>,
 }
 
 impl<const D: usize, const M: usize> Gain<D, M> {
     /// The gain under the prior covariance `prior`, with the covariance after the measurement. `None` if the
     /// innovation covariance is not positive definite.
-    pub fn new(
+    fn new(
         prior: &Covariance<D>,
         jacobian: &SMatrix<f64, M, D>,
         noise: &SMatrix<f64, M, M>,
@@ -155,7 +188,7 @@ impl<const D: usize, const M: usize> Gain<D, M> {
     }
 
     /// The mean after the measured `value`, and the weighted innovation `S^-1 e`.
-    pub fn correct(
+    fn correct(
         &self,
         mean: &SVector<f64, D>,
         value: &SVector<f64, M>,
@@ -168,7 +201,7 @@ impl<const D: usize, const M: usize> Gain<D, M> {
     }
 
     /// The adjoint before the measurement, from the one behind it and the weighted innovation.
-    pub fn adjoint(&self, behind: &SVector<f64, D>, weighted: &SVector<f64, M>) -> SVector<f64, D> {
+    fn adjoint(&self, behind: &SVector<f64, D>, weighted: &SVector<f64, M>) -> SVector<f64, D> {
         behind + self.jacobian.tr_mul(&(weighted - self.gain.tr_mul(behind)))
     }
 }
@@ -231,6 +264,14 @@ pub struct Solver<const D: usize, const M: usize> {
 
 impl<const D: usize, const M: usize> Solver<D, M> {
     /// A chain of one unknown, known to be zero, with room for this many. More grow the room, which allocates.
+    ///
+    /// ```
+    /// use inekf::smoother::Solver;
+    /// use nalgebra::Vector1;
+    ///
+    /// // One unknown, which is zero.
+    /// assert_eq!(Solver::<1, 1>::with_capacity(10, 10).solve(), [Vector1::new(0.0)]);
+    /// ```
     pub fn with_capacity(states: usize, measurements: usize) -> Self {
         let zero = Gaussian {
             mean: SVector::zeros(),
@@ -246,6 +287,22 @@ impl<const D: usize, const M: usize> Solver<D, M> {
     }
 
     /// Begins a new chain, of one unknown with this prior.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use inekf::smoother::{Gaussian, LinearMotion, Solver};
+    /// use nalgebra::{Matrix1, Vector1};
+    ///
+    /// let one = Covariance::from_variances(&Vector1::new(1.0));
+    /// let known = Gaussian { mean: Vector1::new(0.0), covariance: one };
+    /// let walks = LinearMotion { transition: Matrix1::new(1.0), offset: Vector1::new(0.0), noise: Matrix1::new(3.0) };
+    /// let mut solver = Solver::<1, 1>::with_capacity(2, 1);
+    /// solver.start(&known);
+    /// solver.advance(&walks);
+    /// // Another chain: what was is forgotten.
+    /// solver.start(&known);
+    /// assert_eq!(solver.solve().len(), 1);
+    /// ```
     pub fn start(&mut self, prior: &Gaussian<D>) {
         self.prior = *prior;
         self.newest = *prior;
@@ -257,6 +314,24 @@ impl<const D: usize, const M: usize> Solver<D, M> {
     ///
     /// # Errors
     /// [`SmootherError::InnovationNotPositiveDefinite`]; the chain is then as it was.
+    ///
+    /// ```
+    /// # use inekf::smoother::SmootherError;
+    /// use inekf::filter::Covariance;
+    /// use inekf::smoother::{Gaussian, LinearMeasurement, Solver};
+    /// use nalgebra::{Matrix1, Vector1};
+    ///
+    /// let one = Covariance::from_variances(&Vector1::new(1.0));
+    /// let known = Gaussian { mean: Vector1::new(0.0), covariance: one };
+    /// let seen = LinearMeasurement { value: Vector1::new(5.0), jacobian: Matrix1::new(1.0), noise: Matrix1::new(1.0) };
+    /// let mut solver = Solver::<1, 1>::with_capacity(1, 2);
+    /// solver.start(&known);
+    /// // Three of weight one, two of which say 5.
+    /// solver.measure(&seen)?;
+    /// solver.measure(&seen)?;
+    /// assert!((solver.newest().mean.x - 10.0 / 3.0).abs() < 1e-12);
+    /// # Ok::<(), SmootherError>(())
+    /// ```
     pub fn measure(&mut self, measurement: &LinearMeasurement<D, M>) -> Result<(), SmootherError> {
         let (gain, covariance) = Gain::new(
             &self.newest.covariance,
@@ -276,6 +351,21 @@ impl<const D: usize, const M: usize> Solver<D, M> {
     }
 
     /// Adds an unknown at the end.
+    ///
+    /// ```
+    /// use inekf::filter::Covariance;
+    /// use inekf::smoother::{Gaussian, LinearMotion, Solver};
+    /// use nalgebra::{Matrix1, Vector1};
+    ///
+    /// let one = Covariance::from_variances(&Vector1::new(1.0));
+    /// let known = Gaussian { mean: Vector1::new(0.0), covariance: one };
+    /// let walks = LinearMotion { transition: Matrix1::new(1.0), offset: Vector1::new(0.0), noise: Matrix1::new(3.0) };
+    /// let mut solver = Solver::<1, 1>::with_capacity(2, 0);
+    /// solver.start(&known);
+    /// solver.advance(&LinearMotion { offset: Vector1::new(2.0), ..walks });
+    /// // One unknown more, two ahead of the one before.
+    /// assert_eq!(solver.solve(), [Vector1::new(0.0), Vector1::new(2.0)]);
+    /// ```
     pub fn advance(&mut self, motion: &LinearMotion<D>) {
         self.newest = Gaussian {
             mean: motion.transition * self.newest.mean + motion.offset,
@@ -292,11 +382,51 @@ impl<const D: usize, const M: usize> Solver<D, M> {
     }
 
     /// The newest unknown given all measurements: its smoothed and filtered distribution.
+    ///
+    /// ```
+    /// # use inekf::smoother::SmootherError;
+    /// use inekf::filter::Covariance;
+    /// use inekf::smoother::{Gaussian, LinearMeasurement, LinearMotion, Solver};
+    /// use nalgebra::{Matrix1, Vector1};
+    ///
+    /// let one = Covariance::from_variances(&Vector1::new(1.0));
+    /// let known = Gaussian { mean: Vector1::new(0.0), covariance: one };
+    /// let walks = LinearMotion { transition: Matrix1::new(1.0), offset: Vector1::new(0.0), noise: Matrix1::new(3.0) };
+    /// let seen = LinearMeasurement { value: Vector1::new(5.0), jacobian: Matrix1::new(1.0), noise: Matrix1::new(1.0) };
+    /// let mut solver = Solver::<1, 1>::with_capacity(2, 1);
+    /// solver.start(&known);
+    /// solver.advance(&walks);
+    /// solver.measure(&seen)?;
+    /// // Four fifths of the way: of variance 4 before, beside 1.
+    /// assert!((solver.newest().mean.x - 4.0).abs() < 1e-12);
+    /// assert!((solver.newest().covariance.matrix()[(0, 0)] - 0.8).abs() < 1e-12);
+    /// # Ok::<(), SmootherError>(())
+    /// ```
     pub fn newest(&self) -> &Gaussian<D> {
         &self.newest
     }
 
     /// The minimiser, one D-vector for each unknown, oldest first.
+    ///
+    /// ```
+    /// # use inekf::smoother::SmootherError;
+    /// use inekf::filter::Covariance;
+    /// use inekf::smoother::{Gaussian, LinearMeasurement, LinearMotion, Solver};
+    /// use nalgebra::{Matrix1, Vector1};
+    ///
+    /// let one = Covariance::from_variances(&Vector1::new(1.0));
+    /// let known = Gaussian { mean: Vector1::new(0.0), covariance: one };
+    /// let walks = LinearMotion { transition: Matrix1::new(1.0), offset: Vector1::new(0.0), noise: Matrix1::new(3.0) };
+    /// let seen = LinearMeasurement { value: Vector1::new(5.0), jacobian: Matrix1::new(1.0), noise: Matrix1::new(1.0) };
+    /// let mut solver = Solver::<1, 1>::with_capacity(2, 1);
+    /// solver.start(&known);
+    /// solver.advance(&walks);
+    /// solver.measure(&seen)?;
+    /// // The five are shared by what may have been wrong: the start by one, the walk by three, the measurement by one.
+    /// let [first, last] = solver.solve() else { panic!("two unknowns") };
+    /// assert!((first.x - 1.0).abs() < 1e-12 && (last.x - 4.0).abs() < 1e-12);
+    /// # Ok::<(), SmootherError>(())
+    /// ```
     pub fn solve(&mut self) -> &[SVector<f64, D>] {
         self.solution.clear();
         let mut adjoint = SVector::zeros();

@@ -76,6 +76,14 @@ pub struct WindowOptions {
 
 impl WindowOptions {
     /// One iteration, frozen covariances, no gate: the gains are constants wherever the state allows it.
+    ///
+    /// ```
+    /// use inekf::smoother::WindowOptions;
+    ///
+    /// // Constant gains, unless something else is asked for.
+    /// let careful = WindowOptions { iterations: 3, ..WindowOptions::new(10) };
+    /// assert_eq!((careful.capacity, careful.gate), (10, f64::INFINITY));
+    /// ```
     pub const fn new(capacity: usize) -> Self {
         Self {
             capacity,
@@ -216,6 +224,18 @@ pub struct Window<G, S, const D: usize> {
 
 impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     /// A window that holds one state, with `first` as its prior. The only place that allocates.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// // One state, as it was given.
+    /// assert_eq!((window.len(), window.newest()), (1, first));
+    /// ```
     pub fn new(first: &Belief<G, Left, D>, options: &WindowOptions) -> Self {
         let options = WindowOptions {
             capacity: options.capacity.max(1),
@@ -243,6 +263,37 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     }
 
     /// Forgets all states and begins again with `first`.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.update(seen_at(0.3))?;
+    /// window.restart(&first);
+    /// assert_eq!((window.len(), window.newest()), (1, first));
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn restart(&mut self, first: &Belief<G, Left, D>) {
         self.prior = Self::first_prior(first, &self.options);
         self.knots.clear();
@@ -275,6 +326,38 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// Adds the state at the end of `motion`. If the window is full its oldest state leaves first, and its last
     /// estimate, smoothed by all fixes since, is returned. An update that is under way is finished before.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// // There is room for three. The fourth makes the oldest leave, with its last estimate.
+    /// assert!(window.push(&second_of_rest).is_none() && window.push(&second_of_rest).is_none());
+    /// window.update(seen_at(0.3))?;
+    /// let oldest = window.states().next().copied();
+    /// assert_eq!(window.push(&second_of_rest), oldest);
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn push(&mut self, motion: &Preintegration<G, D>) -> Option<G> {
         self.finish();
         let passage = self.passages.enter();
@@ -376,27 +459,144 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// The newest state, with the covariance of its left-invariant error given all fixes, as linearised at the
     /// last update.
+    ///
+    /// ```
+    /// # use inekf::model::PositionObservation;
+    /// # use inekf::smoother::WindowError;
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.update(seen_at(0.3))?;
+    /// // The fix is ten times as good as what was known.
+    /// let newest = window.newest();
+    /// assert!((newest.mean.position.x - 0.3 * 10.0 / 11.0).abs() < 1e-9);
+    /// assert!((newest.covariance.matrix()[(6, 6)] - 0.1 / 11.0).abs() < 1e-9);
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn newest(&self) -> Belief<G, Left, D> {
         let newest = self.newest_knot();
         Belief::new(newest.chi, newest.filtered)
     }
 
     /// The estimates of all states, oldest first.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.update(seen_at(0.3))?;
+    /// // Oldest first: the fix of the second tells of the first, too.
+    /// assert!(window.states().all(|chi| chi.position.x > 0.0));
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn states(&self) -> impl ExactSizeIterator<Item = &G> + DoubleEndedIterator {
         self.knots.iter().map(|knot| &knot.chi)
     }
 
     /// How many states the window holds.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// # use inekf::smoother::Preintegration;
+    /// # use nalgebra::Vector3;
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// for _ in 0..10 {
+    ///     window.push(&second_of_rest);
+    /// }
+    /// // As many as there is room for.
+    /// assert_eq!(window.len(), 3);
+    /// ```
     pub fn len(&self) -> usize {
         self.knots.len()
     }
 
     /// Whether the window holds no state: never.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// assert!(!window.is_empty());
+    /// ```
     pub fn is_empty(&self) -> bool {
         self.knots.len() == 0
     }
 
     /// Whether the next push makes the oldest state leave.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// # use inekf::smoother::Preintegration;
+    /// # use nalgebra::Vector3;
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// assert!(!window.is_full());
+    /// window.push(&second_of_rest);
+    /// window.push(&second_of_rest);
+    /// assert!(window.is_full());
+    /// ```
     pub fn is_full(&self) -> bool {
         self.knots.len() >= self.options.capacity
     }

@@ -1,6 +1,6 @@
 //! Mixtures of Gaussians on a Lie group, and the one Gaussian with their moments.
 //!
-//! All components are written in the coordinates of one [`Chart`] at a reference c: with
+//! All components are written in the coordinates of one `Chart` at a reference c: with
 //! `xi_i = log(c^-1 chi_i)`, a component is `chi = c exp(xi_i + Jr(xi_i)^-1 e_i)` to first order, so that its
 //! mean is `xi_i` and its covariance `C_i = Jr(xi_i)^-1 P_i Jr(xi_i)^-T`. There a mixture is a sum:
 //!
@@ -19,7 +19,7 @@ use crate::lie::LieGroup;
 
 /// A Gaussian in the coordinates of a chart.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Local<const D: usize> {
+pub(crate) struct Local<const D: usize> {
     /// Mean.
     pub xi: SVector<f64, D>,
     /// Covariance, symmetric.
@@ -28,7 +28,7 @@ pub struct Local<const D: usize> {
 
 /// Coordinates `xi` around c: `chi = c exp(xi)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Chart<G> {
+pub(crate) struct Chart<G> {
     /// c.
     pub reference: G,
 }
@@ -84,7 +84,7 @@ impl<G> Chart<G> {
 
 /// Mean and covariance of a mixture in one chart; `None` if no weight is positive. The weights need not add up
 /// to one.
-pub fn moments<'a, const D: usize>(
+pub(crate) fn moments<'a, const D: usize>(
     components: impl Iterator<Item = (f64, &'a Local<D>)>,
 ) -> Option<Local<D>> {
     let mut total = 0.0;
@@ -111,6 +111,22 @@ pub fn moments<'a, const D: usize>(
 }
 
 /// The belief with the mean and the covariance of the mixture of `beliefs`; `None` if no weight is positive.
+///
+/// ```
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::filter::adaptive::mixture::merged;
+/// use inekf::lie::SO2;
+/// use nalgebra::Vector1;
+///
+/// let variance = Covariance::from_variances(&Vector1::new(0.01));
+/// let at = |angle_rad| Belief::<SO2, Left, 1>::new(SO2::from_angle(angle_rad), variance);
+/// // Two headings on either side of the half turn: between them is the half turn, not zero.
+/// let whole = merged(&[0.5, 0.5], &[at(3.1), at(-3.1)]).expect("positive weights");
+/// let apart = core::f64::consts::PI - 3.1;
+/// assert!((whole.mean.angle_rad().abs() - core::f64::consts::PI).abs() < 1e-12);
+/// // The variance is that of each and that of their means.
+/// assert!((whole.covariance.matrix()[(0, 0)] - (0.01 + apart * apart)).abs() < 1e-12);
+/// ```
 pub fn merged<G, const D: usize, const S: usize>(
     weights: &[f64; S],
     beliefs: &[Belief<G, Left, D>; S],

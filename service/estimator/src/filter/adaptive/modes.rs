@@ -140,6 +140,18 @@ pub struct Expected {
 impl Expected {
     /// What is expected of each of the P parameters of `unknowns`: these standard deviations, zero for a parameter
     /// that means nothing.
+    ///
+    /// ```
+    /// use inekf::filter::Expected;
+    /// use inekf::model::{OutputMismatch, ProcessMismatch, Unknowns};
+    /// use nalgebra::Vector2;
+    ///
+    /// let source = OutputMismatch::MeasurementScale { source: 0 };
+    /// let unknowns = Unknowns::new::<2, 2>(&[ProcessMismatch::OdometryScale], &[source]).expect("two");
+    /// let [wheel, source] = Expected::of(&unknowns, &Vector2::new(0.03, 0.01), &Vector2::new(0.2, 0.1));
+    /// assert!(wheel.of_motion && !source.of_motion);
+    /// assert_eq!((wheel.sigma, source.burst_sigma), (0.03, 0.1));
+    /// ```
     pub fn of<const P: usize>(
         unknowns: &Unknowns,
         sigmas: &SVector<f64, P>,

@@ -40,6 +40,25 @@ pub struct PointFix<const N: usize> {
 
 impl<const N: usize> PointFix<N> {
     /// Where the fix is expected, m, world frame: `(1 + eps) x + R b`.
+    ///
+    /// ```
+    /// # use nalgebra::Matrix2;
+    /// use inekf::lie::{LieGroup, SE2};
+    /// use inekf::model::PointFix;
+    /// use nalgebra::Vector2;
+    ///
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// // A source whose metres are a tenth too short sees a tenth more of them.
+    /// let mut chi = SE2::identity();
+    /// chi.position.x = 20.0;
+    /// let short = PointFix { scale_error: 0.1, ..fix(0.0) };
+    /// assert!((short.expected_w(&chi) - Vector2::new(22.0, 0.0)).norm() < 1e-12);
+    /// ```
     pub fn expected_w<G: Pose<D, N>, const D: usize>(&self, chi: &G) -> SVector<f64, N> {
         chi.point_w(&self.lever_arm_b, 1.0 + self.scale_error)
     }
@@ -80,6 +99,23 @@ pub type SpatialPair = Points<2, 3, 6>;
 
 impl<const K: usize, const N: usize, const M: usize> Points<K, N, M> {
     /// These fixes as one observation.
+    ///
+    /// ```
+    /// # use inekf::lie::LieGroup;
+    /// # use inekf::model::PointFix;
+    /// # use nalgebra::Matrix2;
+    /// use inekf::model::PlanarPair;
+    /// use nalgebra::Vector2;
+    ///
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// let pair = PlanarPair::new([fix(1.0), fix(2.0)]);
+    /// assert_eq!(pair.fixes[1].position_w, Vector2::new(2.0, 0.0));
+    /// ```
     pub fn new(fixes: [PointFix<N>; K]) -> Self {
         const { assert!(M == K * N, "M is the number of fixes times their dimension") };
         Self { fixes }
@@ -126,6 +162,24 @@ impl<G: Pose<D, N>, const D: usize, const K: usize, const N: usize, const M: usi
 
 impl<const K: usize, const N: usize, const M: usize> Points<K, N, M> {
     /// Covariance of the stacked noise, M x M: one block for each fix.
+    ///
+    /// ```
+    /// # use inekf::lie::LieGroup;
+    /// # use nalgebra::Vector2;
+    /// use inekf::model::{PlanarPair, PointFix};
+    /// use nalgebra::Matrix2;
+    ///
+    /// # let fix = |x_m: f64| PointFix {
+    /// #     position_w: Vector2::new(x_m, 0.0),
+    /// #     covariance_w: Matrix2::identity(),
+    /// #     lever_arm_b: Vector2::zeros(),
+    /// #     scale_error: 0.0,
+    /// # };
+    /// let uncertain = PointFix { covariance_w: Matrix2::new(4.0, 1.0, 1.0, 4.0), ..fix(1.0) };
+    /// let noise = PlanarPair::new([fix(1.0), uncertain]).noise_covariance();
+    /// // The axes of one source may be correlated, the sources are not.
+    /// assert_eq!((noise[(2, 3)], noise[(1, 2)]), (1.0, 0.0));
+    /// ```
     pub fn noise_covariance(&self) -> SMatrix<f64, M, M> {
         let mut noise = SMatrix::<f64, M, M>::zeros();
         for (source, fix) in self.fixes.iter().enumerate() {

@@ -16,6 +16,41 @@ use crate::model::{
 };
 
 /// A fix.
+///
+/// ```
+/// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+/// # use inekf::smoother::{Preintegration, WindowError};
+/// # use nalgebra::{Matrix3, Vector3};
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::model::HeadingObservation;
+/// use inekf::smoother::{Fix, Window, WindowOptions};
+/// use nalgebra::SVector;
+///
+/// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+/// # let second_of_rest = {
+/// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+/// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+/// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+/// #     let mut motion = Preintegration::new(&SE23::identity());
+/// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+/// #     motion
+/// # };
+/// # let seen_at = |x_m: f64| PositionObservation {
+/// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+/// #     covariance_w: Matrix3::identity() * 0.01,
+/// #     lever_arm_b: Vector3::zeros(),
+/// # };
+/// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+/// // Whatever the sensor, one fix of a state.
+/// let fixes: [Fix; 2] = [seen_at(0.3).into(), HeadingObservation { heading: 0.1, sigma: 0.1 }.into()];
+/// for fix in fixes {
+///     window.push(&second_of_rest);
+///     window.update(fix)?;
+/// }
+/// assert!(window.newest().mean.rotation.heading_rad() > 0.05);
+/// # Ok::<(), WindowError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fix {
     /// Of the position of a point of the body.

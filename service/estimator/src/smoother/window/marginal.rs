@@ -48,6 +48,43 @@ impl<const D: usize> Cover<D> {
 impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     /// Goes on with the covariance of the oldest state, for it to be known when that leaves, while `budget` units of work
     /// are left, and takes what it did from them. Whether it is known.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.push(&second_of_rest);
+    /// window.update(seen_at(0.3))?;
+    /// // One state in each piece: the same as at once.
+    /// let mut pieces = 1;
+    /// while !window.cover_oldest(&mut 1) {
+    ///     pieces += 1;
+    /// }
+    /// assert!(pieces > 1);
+    /// assert_eq!(Some(window.oldest()), window.smoothed(0));
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn cover_oldest(&mut self, budget: &mut i64) -> bool {
         if self.cover.covariance.is_some() {
             return true;
@@ -74,6 +111,39 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     }
 
     /// The oldest state, with its covariance given all fixes.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.update(seen_at(0.3))?;
+    /// // The later fix tells of it, less than of its own state: the velocity between them is not known.
+    /// let variance = |belief: Belief<SE23, Left, 9>| belief.covariance.matrix()[(6, 6)];
+    /// let (oldest, newest) = (variance(window.oldest()), variance(window.newest()));
+    /// assert!(newest < oldest && oldest < variance(first));
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn oldest(&mut self) -> Belief<G, Left, D> {
         let mut budget = i64::MAX;
         self.cover_oldest(&mut budget);
@@ -83,6 +153,33 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// Hands over the covariances of the left-invariant errors of all states given all fixes, the newest first, each with its
     /// index, the oldest 0. Matrix products for each state: for reports, not for each sample.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// # use inekf::smoother::Preintegration;
+    /// # use nalgebra::Vector3;
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.push(&second_of_rest);
+    /// let mut order = Vec::new();
+    /// window.covariances(&mut |index, _| order.push(index));
+    /// // The newest first.
+    /// assert_eq!(order, [2, 1, 0]);
+    /// ```
     pub fn covariances(&self, give: &mut dyn FnMut(usize, &Covariance<D>)) {
         let mut information = SMatrix::zeros();
         for index in (0..self.knots.len()).rev() {
@@ -95,6 +192,38 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// State `index`, oldest 0, with the covariance of its left-invariant error given all fixes, before and
     /// after; `None` beyond the newest. Matrix products for each later state.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.update(seen_at(0.3))?;
+    /// // Nothing came after the newest.
+    /// assert_eq!(window.smoothed(1), Some(window.newest()));
+    /// assert!(window.smoothed(2).is_none());
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn smoothed(&self, index: usize) -> Option<Belief<G, Left, D>> {
         let knot = self.knots.get(index)?;
         let mut information = SMatrix::zeros();

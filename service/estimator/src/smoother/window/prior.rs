@@ -19,6 +19,44 @@ use crate::lie::LieGroup;
 use crate::smoother::Gaussian;
 
 /// How a prior follows the estimate.
+///
+/// ```
+/// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+/// # use inekf::smoother::{Preintegration, WindowError};
+/// # use nalgebra::{Matrix3, Vector3};
+/// use inekf::filter::{Belief, Covariance, Left};
+/// use inekf::lie::{LieGroup, SE23};
+/// use inekf::smoother::{PriorForm, Window, WindowOptions};
+/// use nalgebra::SVector;
+///
+/// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+/// # let second_of_rest = {
+/// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+/// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+/// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+/// #     let mut motion = Preintegration::new(&SE23::identity());
+/// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+/// #     motion
+/// # };
+/// # let seen_at = |x_m: f64| PositionObservation {
+/// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+/// #     covariance_w: Matrix3::identity() * 0.01,
+/// #     lever_arm_b: Vector3::zeros(),
+/// # };
+/// let with = |prior| Window::<SE23, Left, 9>::new(&first, &WindowOptions { prior, ..WindowOptions::new(2) });
+/// let (mut by_mean, mut linear) = (with(PriorForm::GroupMean), with(PriorForm::Linear));
+/// for (k, x_m) in [0.3, -0.2, 0.4].into_iter().enumerate() {
+///     by_mean.push(&second_of_rest);
+///     by_mean.update(seen_at(x_m))?;
+///     linear.push(&second_of_rest);
+///     linear.update(seen_at(x_m))?;
+///     // The same as long as no state has left.
+///     assert!(k > 0 || by_mean.states().eq(linear.states()));
+/// }
+/// // And after that by as much as the estimates moved since, which is little here.
+/// assert!(by_mean.newest().mean.between(&linear.newest().mean).log().norm() < 0.01);
+/// # Ok::<(), WindowError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PriorForm {
     /// A mean on the group, and a frozen covariance.

@@ -66,6 +66,31 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     ///
     /// # Errors
     /// [`WindowError`]; the states are then unchanged, as they are when the fix is gated.
+    ///
+    /// ```
+    /// # use inekf::smoother::WindowError;
+    /// # use nalgebra::Matrix3;
+    /// use inekf::filter::{Belief, Covariance, Left, Verdict};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::model::PositionObservation;
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::{SVector, Vector3};
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// // Half a metre to the left, which is the world's y.
+    /// let fix = PositionObservation { position_w: Vector3::new(0.0, 0.5, 0.0), ..seen_at(0.0) };
+    /// let correction = window.update(fix)?;
+    /// assert_eq!(correction.verdict, Verdict::Accepted);
+    /// // 0.5^2 / (0.1 + 0.01).
+    /// assert!((correction.nis - 0.25 / 0.11).abs() < 1e-9);
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn update(&mut self, fix: impl Into<Fix>) -> Result<WindowCorrection, WindowError> {
         self.begin(fix)?;
         self.finish().unwrap_or(Err(WindowError::NotFinite))
@@ -76,6 +101,39 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     ///
     /// # Errors
     /// [`WindowError::AlreadySeen`]; nothing has begun then.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::Preintegration;
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowError, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.begin(seen_at(0.3))?;
+    /// assert!(window.is_solving());
+    /// // One fix a state: what was begun is finished first.
+    /// assert_eq!(window.begin(seen_at(0.3)), Err(WindowError::AlreadySeen));
+    /// assert!(!window.is_solving());
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn begin(&mut self, fix: impl Into<Fix>) -> Result<(), WindowError> {
         self.finish();
         let fix = fix.into();
@@ -106,6 +164,41 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// Does of the next update what does not depend on its fix, while `budget` units of work are left, and takes what it
     /// did from them. Whether there is nothing left of that.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.update(seen_at(0.3))?;
+    /// // In the time until the next fix.
+    /// let mut budget = 1000;
+    /// assert!(window.anticipate(&mut budget) && budget < 1000);
+    /// // There is nothing more of it.
+    /// let left = budget;
+    /// assert!(window.anticipate(&mut budget) && budget == left);
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn anticipate(&mut self, budget: &mut i64) -> bool {
         // A newest state that nothing has seen may still get its fix, with the oldest one in the window.
         let may_be_seen = self.is_full() && self.newest_knot().fix.is_none();
@@ -131,6 +224,39 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     }
 
     /// Whether all has been done that does not depend on the next fix, if `fix` is the one, of a state to be pushed.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Fix, Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.update(seen_at(0.3))?;
+    /// let next = Fix::Position(seen_at(0.4));
+    /// assert!(!window.is_ready_for(&next));
+    /// window.anticipate(&mut 1000);
+    /// assert!(window.is_ready_for(&next));
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn is_ready_for(&self, fix: &Fix) -> bool {
         let constant = self.gains_hold && self.is_constant() && fix.is_isotropic();
         let is_done = |ahead: &Ahead| ahead.next == self.knots.len() && (ahead.fresh || constant);
@@ -144,6 +270,43 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// Goes on with the update that has just begun, to where the newest state has taken its first step: the last, if
     /// there is one iteration. [`newest`](Self::newest) is then what the filter over the window makes of it.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.push(&second_of_rest);
+    /// let mut at_once = window.clone();
+    /// at_once.update(seen_at(0.3))?;
+    /// window.begin(seen_at(0.3))?;
+    /// // The newest state is ready, the others follow.
+    /// assert!(window.lead().is_none());
+    /// assert_eq!(window.newest(), at_once.newest());
+    /// window.finish();
+    /// assert!(window.states().eq(at_once.states()));
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn lead(&mut self) -> Outcome {
         let Some(Solve {
             pass: Pass::Forward { next },
@@ -162,6 +325,47 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
 
     /// Goes on with the update that is under way while `budget` units of work are left, and takes what it did from
     /// them; the last state may overdraw it. Gives what came of the update once it is done.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise, PositionObservation};
+    /// # use inekf::smoother::{Preintegration, WindowError};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.push(&second_of_rest);
+    /// window.push(&second_of_rest);
+    /// let mut at_once = window.clone();
+    /// let expected = at_once.update(seen_at(0.3));
+    /// window.begin(seen_at(0.3))?;
+    /// // A state in each slice, and the same in the end.
+    /// let mut slices = 1;
+    /// let outcome = loop {
+    ///     match window.advance(&mut 1) {
+    ///         Some(outcome) => break outcome,
+    ///         None => slices += 1,
+    ///     }
+    /// };
+    /// assert!(slices > 1 && outcome == expected);
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn advance(&mut self, budget: &mut i64) -> Outcome {
         let mut solve = self.solve.take()?;
         let outcome = self.go_on(&mut solve, budget);
@@ -174,17 +378,88 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     }
 
     /// Does the rest of the update that is under way; `None` if there is none.
+    ///
+    /// ```
+    /// # use inekf::model::PositionObservation;
+    /// # use inekf::smoother::WindowError;
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left, Verdict};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// assert!(window.finish().is_none());
+    /// window.begin(seen_at(0.3))?;
+    /// let correction = window.finish().expect("one was under way")?;
+    /// assert_eq!(correction.verdict, Verdict::Accepted);
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn finish(&mut self) -> Outcome {
         let mut budget = i64::MAX;
         self.advance(&mut budget)
     }
 
     /// Whether an update is under way.
+    ///
+    /// ```
+    /// # use inekf::model::PositionObservation;
+    /// # use inekf::smoother::WindowError;
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let seen_at = |x_m: f64| PositionObservation {
+    /// #     position_w: Vector3::new(x_m, 0.0, 0.0),
+    /// #     covariance_w: Matrix3::identity() * 0.01,
+    /// #     lever_arm_b: Vector3::zeros(),
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// window.begin(seen_at(0.3))?;
+    /// assert!(window.is_solving());
+    /// window.finish();
+    /// assert!(!window.is_solving());
+    /// # Ok::<(), WindowError>(())
+    /// ```
     pub fn is_solving(&self) -> bool {
         self.solve.is_some()
     }
 
     /// The units of work of the next push and update, and of the covariance of the state that leaves.
+    ///
+    /// ```
+    /// # use inekf::model::{Discretisation, ImuInput, ImuNoise};
+    /// # use inekf::smoother::Preintegration;
+    /// # use nalgebra::Vector3;
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// # let second_of_rest = {
+    /// #     let at_rest = ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, 9.80665) };
+    /// #     let noise = ImuNoise { gyro_psd: 1e-6, accel_psd: 1e-4, gyro_bias_psd: 0.0, accel_bias_psd: 0.0 };
+    /// #     let g_w = Vector3::new(0.0, 0.0, -9.80665);
+    /// #     let mut motion = Preintegration::new(&SE23::identity());
+    /// #     motion.push(&at_rest, &g_w, 1.0, Discretisation::ZeroOrderHold, &noise);
+    /// #     motion
+    /// # };
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// // More states, more work: as long as there is room for them.
+    /// let of_two = window.work();
+    /// window.push(&second_of_rest);
+    /// assert!(window.work() > of_two);
+    /// ```
     pub fn work(&self) -> i64 {
         let states = (self.knots.len() + 1).min(self.options.capacity) as i64;
         let of_oldest = if self.is_full() {
@@ -197,6 +472,18 @@ impl<G: InertialState<D>, S: Side, const D: usize> Window<G, S, D> {
     }
 
     /// The units of work of a push.
+    ///
+    /// ```
+    /// use inekf::filter::{Belief, Covariance, Left};
+    /// use inekf::lie::{LieGroup, SE23};
+    /// use inekf::smoother::{Window, WindowOptions};
+    /// use nalgebra::SVector;
+    ///
+    /// let first = Belief::new(SE23::identity(), Covariance::from_variances(&SVector::repeat(0.1)));
+    /// let mut window = Window::<SE23, Left, 9>::new(&first, &WindowOptions::new(3));
+    /// // A part of the work.
+    /// assert!(window.work_of_push() < window.work());
+    /// ```
     pub fn work_of_push(&self) -> i64 {
         3 * work::matrices(D, self.is_tracked())
     }

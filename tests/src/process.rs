@@ -135,6 +135,18 @@ impl Drop for Running {
     }
 }
 
+/// Whether SIGINT is ignored here, as under `nohup` or behind a shell's `&`: programs that are started inherit that, and
+/// leave it so unless they handle it.
+pub fn ignores_interrupts() -> bool {
+    let status = fs::read_to_string("/proc/self/status").expect("the status of this process");
+    let mask = status
+        .lines()
+        .find_map(|line| line.strip_prefix("SigIgn:"))
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    // Bit 0 is signal 1.
+    mask.expect("the ignored signals") & (1 << (Signal::INT.as_raw() - 1)) != 0
+}
+
 /// Runs the client with these arguments to its end.
 pub fn client<A: AsRef<std::ffi::OsStr>>(
     memory: &Memory,

@@ -7,8 +7,11 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use inekf_shared::transport::Watched;
+use rustix::process::setpriority_process;
 use tracing::warn;
 
+/// As `nice` counts.
+const LEAST_PRIORITY: i32 = 19;
 /// Time between two looks.
 const PERIOD: Duration = Duration::from_millis(250);
 
@@ -31,8 +34,15 @@ impl Guard {
         let (awake, asleep) = channel::<()>();
         let told = Arc::clone(&gone);
         let look = move || {
+            // Of this thread alone: what is estimated meanwhile goes first. If it cannot be, it is short all the same.
+            let _ = setpriority_process(None, LEAST_PRIORITY);
+            let mut folders = looked_after.folders();
             while asleep.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
-                if !looked_after.is_intact() {
+                // Each of them, or the next look would take what this one has not noted for a change.
+                let changed = folders
+                    .iter_mut()
+                    .fold(false, |any, folder| folder.has_changed() || any);
+                if changed && !looked_after.is_intact() {
                     told.store(true, Ordering::Relaxed);
                     return;
                 }

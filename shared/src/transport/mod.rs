@@ -99,6 +99,7 @@
 
 mod classify;
 mod error;
+mod folder;
 pub mod inspect;
 mod node;
 mod open;
@@ -110,6 +111,7 @@ mod sweep;
 mod watched;
 
 pub use error::TransportError;
+pub use folder::Folder;
 pub use iceoryx2::config::Config;
 pub use node::{
     IPC_PREFIX_VARIABLE, IPC_ROOT_AND_PREFIX_MAX_LEN, IPC_ROOT_VARIABLE, Node, config,

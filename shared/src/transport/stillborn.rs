@@ -15,8 +15,11 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
+use rustix::process::setpriority_process;
+
 use super::Config;
-use super::inspect::SHARED_MEMORY;
+use super::folder::Folder;
+use super::inspect::{self, SHARED_MEMORY};
 
 /// A segment is readable once it is complete.
 const OWNER_READ: u32 = 0o400;
@@ -24,6 +27,8 @@ const OWNER_READ: u32 = 0o400;
 const LOOKS: u32 = 2;
 /// The time between two looks is at least so many times what a look takes: a fleet has tens of thousands of files.
 const LEAST_REST: u32 = 50;
+/// As `nice` counts.
+const LEAST_PRIORITY: i32 = 19;
 /// The thread needs little, and locked memory should not pay for more.
 const STACK_BYTES: usize = 128 * 1024;
 
@@ -32,24 +37,26 @@ pub(super) fn is_complete(segment: &Metadata) -> bool {
     segment.len() > 0 && segment.permissions().mode() & OWNER_READ != 0
 }
 
-/// Removes the segments under the prefix that are not complete and older than the creation timeout.
-fn remove(config: &Config) {
+/// Removes the segments under the prefix that are not complete and older than the creation timeout. Returns whether there
+/// are any, old or young.
+fn remove(config: &Config) -> bool {
     let prefix = config.global.prefix.to_string();
-    let Ok(entries) = fs::read_dir(SHARED_MEMORY) else {
-        return;
+    let Ok(files) = inspect::files(Path::new(SHARED_MEMORY), &prefix) else {
+        return true;
     };
-    for entry in entries.filter_map(Result::ok) {
-        let is_stillborn = entry.file_name().to_string_lossy().starts_with(&prefix)
-            && entry.metadata().is_ok_and(|metadata| {
-                metadata.is_file()
-                    && !is_complete(&metadata)
-                    && age(&metadata) > config.global.creation_timeout
-            });
+    let mut any = false;
+    for (path, _) in files.iter().filter(|(_, metadata)| !is_complete(metadata)) {
+        any = true;
+        // It may have been finished meanwhile.
+        let is_stillborn = fs::metadata(path).is_ok_and(|metadata| {
+            !is_complete(&metadata) && age(&metadata) > config.global.creation_timeout
+        });
         if is_stillborn {
             // Another may have been faster; of another user's nothing can be removed.
-            let _ = fs::remove_file(entry.path());
+            let _ = fs::remove_file(path);
         }
     }
+    any
 }
 
 fn age(metadata: &Metadata) -> Duration {
@@ -60,7 +67,7 @@ fn age(metadata: &Metadata) -> Duration {
 /// Whether there is any shared memory that is not complete under the prefix.
 pub(super) fn is_there(config: &Config) -> bool {
     let prefix = config.global.prefix.to_string();
-    super::inspect::files(Path::new(SHARED_MEMORY), &prefix)
+    inspect::files(Path::new(SHARED_MEMORY), &prefix)
         .is_ok_and(|files| files.iter().any(|(_, metadata)| !is_complete(metadata)))
 }
 
@@ -95,9 +102,16 @@ impl Warden {
         let shortest = config.global.creation_timeout / LOOKS;
         let mut period = shortest;
         let look = move || {
+            // Of this thread alone: what is estimated meanwhile goes first. If it cannot be, it is short all the same.
+            let _ = setpriority_process(None, LEAST_PRIORITY);
+            let mut folder = Folder::new(SHARED_MEMORY.into());
+            let mut any = true;
             while asleep.recv_timeout(period) == Err(RecvTimeoutError::Timeout) {
                 let started = Instant::now();
-                remove(&config);
+                // Where nothing has come there is nothing new that is not complete.
+                if folder.has_changed() || any {
+                    any = remove(&config);
+                }
                 period = shortest.max(started.elapsed() * LEAST_REST);
             }
         };

@@ -8,6 +8,7 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
+use super::folder::Folder;
 use super::inspect::SHARED_MEMORY;
 use super::sweep::{ids, process_of, service_id};
 use super::{Node, TransportError};
@@ -169,6 +170,20 @@ impl Watched {
             Seen::gone(Path::new(SHARED_MEMORY).join(name))
         }));
         Ok(Self(files))
+    }
+
+    /// The folders they are in. While none of these changes, all files are still there and the same.
+    #[must_use]
+    pub fn folders(&self) -> Vec<Folder> {
+        let folders: BTreeSet<&Path> = self
+            .0
+            .iter()
+            .filter_map(|file| file.path.parent())
+            .collect();
+        folders
+            .into_iter()
+            .map(|folder| Folder::new(folder.to_path_buf()))
+            .collect()
     }
 
     /// Whether all of them are still there, and are the same. One system call for each.

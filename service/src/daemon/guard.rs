@@ -39,9 +39,10 @@ impl Guard {
             let mut folders = looked_after.folders();
             while asleep.recv_timeout(PERIOD) == Err(RecvTimeoutError::Timeout) {
                 // Each of them, or the next look would take what this one has not noted for a change.
-                let changed = folders
-                    .iter_mut()
-                    .fold(false, |any, folder| folder.has_changed() || any);
+                let mut changed = false;
+                for folder in &mut folders {
+                    changed |= folder.has_changed();
+                }
                 if changed && !looked_after.is_intact() {
                     told.store(true, Ordering::Relaxed);
                     return;

@@ -1,6 +1,7 @@
 //! Nodes, and where their files are.
 
 use core::cell::RefCell;
+use core::mem::replace;
 use core::ops::Deref;
 use core::time::Duration;
 use std::env::{self, VarError};
@@ -294,6 +295,7 @@ fn create(name: &str, config: &Config) -> Result<Node, TransportError> {
     // Before the node, which may have to wait for it.
     let warden = Warden::of(config);
     let started = Instant::now();
+    let mut is_last = false;
     let node = loop {
         let created = NodeBuilder::new()
             .name(&node_name)
@@ -302,8 +304,11 @@ fn create(name: &str, config: &Config) -> Result<Node, TransportError> {
             .create::<ipc::Service>();
         match created {
             Ok(node) => break node,
-            // The count of nodes may have been left half made; it goes away soon.
-            Err(_) if started.elapsed() < PATIENCE && stillborn::is_there(config) => {
+            // The count of nodes may have been left half made; it goes away soon, or has just gone.
+            Err(_)
+                if started.elapsed() < PATIENCE
+                    && (stillborn::is_there(config) || !replace(&mut is_last, true)) =>
+            {
                 sleep(LOOK_EVERY);
             }
             Err(error) => return Err(refuse(format!("{error:?}"))),

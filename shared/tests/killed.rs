@@ -241,14 +241,22 @@ fn what_went_before_it_was_first_looked_at_counts_as_gone() {
     let text = std::fs::read_to_string(description).unwrap();
     std::fs::remove_file(description).unwrap();
     assert!(!is_intact());
-    // Another service of the same name.
+    // Another service of the same name, whose file may have been given the number of the removed one.
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     let id = lines
         .iter_mut()
         .find(|line| line.starts_with("unique_value"));
     *id.unwrap_or_else(|| panic!("{text}")) = "unique_value = 12345".to_owned();
-    std::fs::write(description, lines.join("\n")).unwrap();
+    let other = lines.join("\n");
+    std::fs::write(description, &other).unwrap();
     assert!(!is_intact());
+    std::fs::write(description, &text).unwrap();
+    let watched = Watched::services_of(&node).unwrap();
+    assert!(watched.is_intact());
+    std::fs::remove_file(description).unwrap();
+    std::fs::write(description, &other).unwrap();
+    assert!(!watched.is_intact());
+    std::fs::remove_file(description).unwrap();
     std::fs::write(description, &text).unwrap();
     assert!(is_intact());
     // Its shared part.

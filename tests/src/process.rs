@@ -129,6 +129,10 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
+        // A test that fails says what its programs had to say.
+        if std::thread::panicking() {
+            eprintln!("process {} wrote:\n{}", self.id(), self.stderr());
+        }
         // It may have ended.
         let _ = self.child.kill();
         let _ = self.child.wait();

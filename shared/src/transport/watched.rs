@@ -5,7 +5,6 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use super::folder::Folder;
@@ -36,53 +35,42 @@ use crate::clock::monotonic_ns;
 #[derive(Clone, Debug, Default)]
 pub struct Watched(Vec<Seen>);
 
-/// A file that should be there: its place, and which file of that name it is; none if it had gone before it was seen.
+/// A file that should be there.
 #[derive(Clone, Debug)]
 struct Seen {
     path: PathBuf,
-    which: Option<Which>,
+    identity: Identity,
 }
 
-/// Which file it is of all that ever had its name.
+/// How a file is told from others of its name. Not by its inode: the number of one that was removed is given to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Which {
-    device: u64,
-    inode: u64,
-}
-
-impl Which {
-    /// The file that is at `path` now.
-    fn at(path: &Path) -> Option<Self> {
-        let metadata = fs::symlink_metadata(path).ok()?;
-        Some(Self {
-            device: metadata.dev(),
-            inode: metadata.ino(),
-        })
-    }
+enum Identity {
+    /// Its name holds an id that nobody else ever has.
+    Name,
+    /// It describes the service with this id.
+    Service(u128),
+    /// It had gone before it was seen, whatever there is in its place.
+    Gone,
 }
 
 impl Seen {
-    fn at(path: PathBuf) -> Self {
-        Self {
-            which: Which::at(&path),
-            path,
-        }
-    }
-
-    /// One that has gone, whatever there is in its place.
-    fn gone(path: PathBuf) -> Self {
-        Self { path, which: None }
-    }
-
     fn is_there(&self) -> bool {
-        self.which.is_some() && self.which == Which::at(&self.path)
+        match self.identity {
+            Identity::Name => fs::symlink_metadata(&self.path).is_ok(),
+            Identity::Service(id) => described(&self.path) == Some(id),
+            Identity::Gone => false,
+        }
     }
 
     /// Whether another file is there.
     fn is_replaced(&self) -> bool {
-        let now = Which::at(&self.path);
-        now.is_some() && now != self.which
+        self.identity != Identity::Name && self.path.exists() && !self.is_there()
     }
+}
+
+/// The id of the service that a file describes.
+fn described(path: &Path) -> Option<u128> {
+    service_id(&fs::read_to_string(path).ok()?)
 }
 
 impl Watched {
@@ -124,7 +112,11 @@ impl Watched {
         let services = PathBuf::from(global.service_dir().to_string());
 
         let monitor = nodes.join(format!("{prefix}{own}{}", global.node.monitor_suffix));
-        let mut files = vec![Seen::at(monitor)];
+        let unique = |path: PathBuf| Seen {
+            path,
+            identity: Identity::Name,
+        };
+        let mut files = vec![unique(monitor)];
         let tag_suffix = global.node.service_tag_suffix.to_string();
         let mut used = Vec::new();
         for tag in names(&nodes.join(own.to_string()))? {
@@ -138,15 +130,12 @@ impl Watched {
                 "{service}{}",
                 global.service.static_config_storage_suffix
             ));
-            let seen = Seen::at(description);
-            let text = fs::read_to_string(&seen.path).ok();
-            let described = text.and_then(|text| service_id(&text));
-            let id = node.opened(service).or(described);
-            used.extend(id);
             // Between its opening and now others may have removed it, or made another of its name.
-            files.push(match id.is_some() && id == described {
-                true => seen,
-                false => Seen::gone(seen.path),
+            let id = node.opened(service).or_else(|| described(&description));
+            used.extend(id);
+            files.push(Seen {
+                path: description,
+                identity: id.map_or(Identity::Gone, Identity::Service),
             });
         }
         let data_suffix = global.service.data_segment_suffix.to_string();
@@ -161,13 +150,16 @@ impl Watched {
                 found.insert(id);
             }
             if is_shared || (with_data && is_own) {
-                files.push(Seen::at(Path::new(SHARED_MEMORY).join(name)));
+                files.push(unique(Path::new(SHARED_MEMORY).join(name)));
             }
         }
         let missing = used.into_iter().filter(|id| !found.contains(id));
         files.extend(missing.map(|id| {
             let name = format!("{prefix}{id}{shared_suffix}");
-            Seen::gone(Path::new(SHARED_MEMORY).join(name))
+            Seen {
+                path: Path::new(SHARED_MEMORY).join(name),
+                identity: Identity::Gone,
+            }
         }));
         Ok(Self(files))
     }
@@ -186,7 +178,7 @@ impl Watched {
             .collect()
     }
 
-    /// Whether all of them are still there, and are the same. One system call for each.
+    /// Whether all of them are still there, and are the same. A few system calls for each.
     #[must_use]
     pub fn is_intact(&self) -> bool {
         self.0.iter().all(Seen::is_there)

@@ -37,6 +37,7 @@ mod prior;
 mod ring;
 mod solve;
 mod track;
+mod work;
 
 use knot::{Knot, Passage};
 use marginal::Cover;

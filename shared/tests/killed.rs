@@ -259,6 +259,15 @@ fn what_went_before_it_was_first_looked_at_counts_as_gone() {
     std::fs::remove_file(description).unwrap();
     std::fs::write(description, &text).unwrap();
     assert!(is_intact());
+    // Another process makes one anew, whole.
+    std::fs::remove_file(description).unwrap();
+    let other = memory.node();
+    let anew = transport::estimate::<EstimateSe23>(&other, &instance).unwrap();
+    assert!(Watched::services_of(&other).unwrap().is_intact());
+    assert!(!watched.is_intact() && !is_intact());
+    drop((anew, other));
+    std::fs::write(description, &text).unwrap();
+    assert!(is_intact());
     // Its shared part.
     let files = memory.shared_memory_files();
     let dynamic = files.iter().find(|name| name.ends_with(".dynamic"));

@@ -120,18 +120,16 @@ impl Watched {
         let tag_suffix = global.node.service_tag_suffix.to_string();
         let mut used = Vec::new();
         for tag in names(&nodes.join(own.to_string()))? {
-            let Some(service) = tag
+            let hash = tag
                 .strip_suffix(&tag_suffix)
-                .filter(|name| name.starts_with(&prefix))
-            else {
-                continue;
-            };
+                .and_then(|name| name.strip_prefix(&prefix));
+            let Some(hash) = hash else { continue };
             let description = services.join(format!(
-                "{service}{}",
+                "{prefix}{hash}{}",
                 global.service.static_config_storage_suffix
             ));
             // Between its opening and now others may have removed it, or made another of its name.
-            let id = node.opened(service).or_else(|| described(&description));
+            let id = node.opened(hash).or_else(|| described(&description));
             used.extend(id);
             files.push(Seen {
                 path: description,

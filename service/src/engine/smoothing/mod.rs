@@ -4,13 +4,13 @@
 //! is published for a sample is the newest of them, moved along the samples since as a filter would: nothing of the
 //! window is touched before. Then come the fixes that are due: each is judged against the estimate at its stamp, and
 //! if it is let in the newest state is smoothed and the samples after it are gone through again. The other states
-//! follow in pieces of bounded work, some after each sample ([`behind`]). Where the window is not ready for a fix it
+//! follow in pieces of bounded work, some after each sample (`behind`). Where the window is not ready for a fix it
 //! corrects the estimate as a plain filter's would, and the smoothed estimate takes its place some samples later, published
 //! under the same stamp as the sample then.
 //!
 //! A fix that is late, but not older than the last one, is fused as if it had been on time: once the window has seen it,
-//! the estimate is the same bit for bit ([`since`]); an older one is too late. A fix that comes between two samples waits
-//! for [`settle`](Past::settle), or for the next sample to be out.
+//! the estimate is the same bit for bit (`since`); an older one is too late. A fix that comes between two samples waits
+//! for [`settle`](super::Engine::settle), or for the next sample to be out.
 //!
 //! A lock-out ends with a new window: it begins with the widened estimate, for what the old one believed is doubted.
 //!

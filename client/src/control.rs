@@ -141,6 +141,26 @@ impl Controller {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::control::Controller;
+    /// use inekf_shared::topic::Instance;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().expect("a name");
+    /// # // SAFETY: this process has no other thread.
+    /// # unsafe {
+    /// #     std::env::set_var("INEKF_IPC_ROOT", root.path());
+    /// #     std::env::set_var("INEKF_IPC_PREFIX", prefix);
+    /// # }
+    /// // Whether its daemon runs already or not; asked is it only then.
+    /// let mut controller = Controller::open(&Instance::new("car")?, Duration::from_millis(1))?;
+    /// let unanswered = controller.barrier().expect_err("nobody is there");
+    /// assert!(!unanswered.to_string().is_empty());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open(instance: &Instance, timeout: Duration) -> Result<Self, TransportError> {
         Self::open_on(transport::open_node(NODE)?, instance, timeout)
     }
@@ -149,6 +169,22 @@ impl Controller {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
+    ///
+    /// ```
+    /// use std::time::Duration;
+    ///
+    /// use inekf_client::control::Controller;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// let mut controller = Controller::open_on(node()?, &Instance::new("car")?, Duration::from_millis(1))?;
+    /// assert!(controller.snapshot().is_err());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open_on(
         node: Node,
         instance: &Instance,

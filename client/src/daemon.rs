@@ -163,11 +163,32 @@ impl Daemon {
     }
 
     /// What the daemon said when it was ready.
+    ///
+    /// It is not run here, for it starts the program `inekf-service`:
+    ///
+    /// ```no_run
+    /// # use std::path::Path;
+    /// # use inekf_client::daemon::{Daemon, private_instance};
+    /// # let daemon = Daemon::start(Path::new("car.toml"), &private_instance("trial")?)?;
+    /// assert!(daemon.ready_line().starts_with("ready: instance trial"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn ready_line(&self) -> &str {
         &self.ready_line
     }
 
     /// The daemon's process id.
+    ///
+    /// It is not run here, for it starts the program `inekf-service`:
+    ///
+    /// ```no_run
+    /// # use std::path::Path;
+    /// # use inekf_client::daemon::{Daemon, private_instance};
+    /// # let daemon = Daemon::start(Path::new("car.toml"), &private_instance("trial")?)?;
+    /// // Its ready line has it too.
+    /// assert!(daemon.ready_line().contains(&format!("process {}", daemon.id())));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn id(&self) -> u32 {
         self.child.id()
     }
@@ -176,6 +197,17 @@ impl Daemon {
     ///
     /// # Errors
     /// It did not stop in time (it is then killed), or ended with a failure.
+    ///
+    /// It is not run here, for it starts the program `inekf-service`:
+    ///
+    /// ```no_run
+    /// # use std::path::Path;
+    /// # use inekf_client::daemon::{Daemon, private_instance};
+    /// let daemon = Daemon::start(Path::new("car.toml"), &private_instance("trial")?)?;
+    /// // Dropped it would be stopped as well, but nobody would hear of a failure.
+    /// daemon.stop()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn stop(mut self) -> anyhow::Result<()> {
         match self.terminate()? {
             Some(status) if status.success() => Ok(()),
@@ -185,6 +217,16 @@ impl Daemon {
     }
 
     /// Whether the daemon still runs.
+    ///
+    /// It is not run here, for it starts the program `inekf-service`:
+    ///
+    /// ```no_run
+    /// # use std::path::Path;
+    /// # use inekf_client::daemon::{Daemon, private_instance};
+    /// # let mut daemon = Daemon::start(Path::new("car.toml"), &private_instance("trial")?)?;
+    /// assert!(daemon.is_running());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn is_running(&mut self) -> bool {
         matches!(self.child.try_wait(), Ok(None))
     }

@@ -17,19 +17,20 @@
 //! If somebody removes the files in shared memory, every reader attaches anew by itself: it looks when nothing has come
 //! for a quarter of a second, and the call that finds them gone takes as long as opening did.
 
-use core::cell::RefCell;
-
 use inekf_shared::message::{EstimateMessage, EstimateSe23, Message, SmoothedState};
 use inekf_shared::topic::Instance;
-use inekf_shared::transport::{self, LatestReader, Node, Received, Subscriber, TransportError};
+use inekf_shared::transport::{self, Node, Received, Subscriber, TransportError};
 
 use crate::attach::{Attached, Seldom};
 use crate::model::Model;
 
+mod latest;
+
+pub use latest::LatestEstimate;
+
 /// Names of the readers' nodes, for people who list the nodes.
 const READER: &str = "inekf-reader";
 const SMOOTHED: &str = "inekf-smoothed";
-const LATEST: &str = "inekf-latest";
 
 /// Estimates or smoothed states could not be received.
 ///
@@ -137,6 +138,23 @@ impl<E: EstimateMessage> EstimateReader<E> {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy; the daemon's model has to be that of `E`.
+    ///
+    /// ```
+    /// use inekf_client::read::EstimateReader;
+    /// use inekf_shared::message::EstimateSe23;
+    /// use inekf_shared::topic::Instance;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().expect("a name");
+    /// # // SAFETY: this process has no other thread.
+    /// # unsafe {
+    /// #     std::env::set_var("INEKF_IPC_ROOT", root.path());
+    /// #     std::env::set_var("INEKF_IPC_PREFIX", prefix);
+    /// # }
+    /// let mut reader = EstimateReader::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// assert!(reader.next_estimate()?.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open(instance: &Instance) -> Result<Self, TransportError> {
         Self::open_on(transport::open_node(READER)?, instance)
     }
@@ -174,6 +192,23 @@ impl<E: EstimateMessage> EstimateReader<E> {
     }
 
     /// How often it attached anew because its files had been removed.
+    ///
+    /// ```
+    /// use inekf_client::read::EstimateReader;
+    /// use inekf_shared::message::{EstimateSe23, Zero};
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let instance = Instance::new("car")?;
+    /// let mut reader = EstimateReader::<EstimateSe23>::open_on(node()?, &instance)?;
+    /// // Nobody has removed a file of theirs yet.
+    /// assert_eq!(reader.reattached(), 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn reattached(&self) -> u64 {
         self.estimates.subscriber.times()
     }
@@ -249,6 +284,30 @@ impl<E: EstimateMessage> EstimateReader<E> {
     }
 
     /// Estimates that were overwritten before they were read.
+    ///
+    /// ```
+    /// use inekf_client::read::EstimateReader;
+    /// use inekf_shared::message::{EstimateSe23, Zero};
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let instance = Instance::new("car")?;
+    /// let mut reader = EstimateReader::<EstimateSe23>::open_on(node()?, &instance)?;
+    /// # let daemon = node()?;
+    /// # let publisher = transport::estimate(&daemon, &instance)?.publisher()?;
+    /// for estimate_seq in [1, 4] {
+    ///     let mut estimate = EstimateSe23::ZERO;
+    ///     estimate.head.estimate_seq = estimate_seq;
+    ///     publisher.send_copy(estimate)?;
+    ///     reader.next_estimate()?;
+    /// }
+    /// assert_eq!(reader.missed(), 2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn missed(&self) -> u64 {
         self.missed
     }
@@ -293,6 +352,22 @@ impl SmoothedReader {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
+    ///
+    /// ```
+    /// use inekf_client::read::SmoothedReader;
+    /// use inekf_shared::topic::Instance;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().expect("a name");
+    /// # // SAFETY: this process has no other thread.
+    /// # unsafe {
+    /// #     std::env::set_var("INEKF_IPC_ROOT", root.path());
+    /// #     std::env::set_var("INEKF_IPC_PREFIX", prefix);
+    /// # }
+    /// let mut reader = SmoothedReader::open(&Instance::new("car")?)?;
+    /// assert!(reader.next_state()?.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open(instance: &Instance) -> Result<Self, TransportError> {
         Self::open_on(transport::open_node(SMOOTHED)?, instance)
     }
@@ -301,6 +376,22 @@ impl SmoothedReader {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
+    ///
+    /// ```
+    /// use inekf_client::read::SmoothedReader;
+    /// use inekf_shared::message::{SmoothedState, Zero};
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let instance = Instance::new("car")?;
+    /// let mut reader = SmoothedReader::open_on(node()?, &instance)?;
+    /// assert!(reader.next_state()?.is_none() && reader.missed() == 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
         let open =
             |node: &Node, instance: &Instance| transport::smoothed(node, instance)?.subscriber();
@@ -351,98 +442,29 @@ impl SmoothedReader {
     }
 
     /// States that left the window and were overwritten before they were read.
+    ///
+    /// ```
+    /// use inekf_client::read::SmoothedReader;
+    /// use inekf_shared::message::{SmoothedState, Zero};
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let instance = Instance::new("car")?;
+    /// let mut reader = SmoothedReader::open_on(node()?, &instance)?;
+    /// # let daemon = node()?;
+    /// # let publisher = transport::smoothed(&daemon, &instance)?.publisher()?;
+    /// for index in [0, 3] {
+    ///     publisher.send_copy(SmoothedState { index, ..SmoothedState::ZERO })?;
+    ///     reader.next_state()?;
+    /// }
+    /// assert_eq!(reader.missed(), 2);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn missed(&self) -> u64 {
         self.missed
-    }
-}
-
-/// Reads the newest estimate only, as a controller would.
-///
-/// ```
-/// use inekf_client::read::LatestEstimate;
-/// use inekf_shared::message::{EstimateSe23, Zero};
-/// use inekf_shared::topic::Instance;
-/// use inekf_shared::transport;
-///
-/// # let root = tempfile::tempdir_in("/tmp")?;
-/// # let prefix = root.path().file_name().and_then(|name| name.to_str());
-/// # let config = transport::config(root.path().to_str(), prefix)?;
-/// # let node = || transport::open_node_with("doc", &config);
-/// let instance = Instance::new("car")?;
-/// // What a daemon does:
-/// let daemon = node()?;
-/// let writer = transport::latest(&daemon, &instance, EstimateSe23::ZERO)?.writer()?;
-/// let newest = LatestEstimate::<EstimateSe23>::open_on(node()?, &instance)?;
-/// // Before the first.
-/// assert_eq!(newest.read().head.estimate_seq, 0);
-/// for estimate_seq in 1..=3 {
-///     let mut estimate = EstimateSe23::ZERO;
-///     estimate.head.estimate_seq = estimate_seq;
-///     assert!(writer.write(estimate));
-/// }
-/// // However slow the reader: the newest, and only that.
-/// assert_eq!(newest.read().head.estimate_seq, 3);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub struct LatestEstimate<E: EstimateMessage = EstimateSe23> {
-    state: RefCell<LatestState<E>>,
-}
-
-struct LatestState<E: EstimateMessage> {
-    latest: Attached<LatestReader<E>>,
-    seldom: Seldom,
-    /// The last one that was read while nothing came: what there is while there is no other.
-    last: E,
-    last_seq: u64,
-}
-
-impl<E: EstimateMessage> LatestEstimate<E> {
-    /// A reader of the newest estimate of `instance`, whose daemon must be running.
-    ///
-    /// # Errors
-    /// [`TransportError`], naming the service and the remedy.
-    pub fn open(instance: &Instance) -> Result<Self, TransportError> {
-        Self::open_on(transport::open_node(LATEST)?, instance)
-    }
-
-    /// The same on a node of one's own.
-    ///
-    /// # Errors
-    /// [`TransportError`], naming the service and the remedy.
-    pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
-        let open = |node: &Node, instance: &Instance| {
-            transport::open_latest::<E>(node, instance)?.reader()
-        };
-        Ok(Self {
-            state: RefCell::new(LatestState {
-                latest: Attached::open(node, LATEST, instance, open)?,
-                seldom: Seldom::new(),
-                last: E::ZERO,
-                last_seq: 0,
-            }),
-        })
-    }
-
-    /// The newest estimate; its `estimate_seq` is 0 before the first. While the daemon's files are gone it is the last
-    /// one there was.
-    pub fn read(&self) -> E {
-        self.state.borrow_mut().read()
-    }
-}
-
-impl<E: EstimateMessage> LatestState<E> {
-    fn read(&mut self) -> E {
-        let estimate = match self.latest.ports() {
-            Some(latest) => latest.read(),
-            None => self.last,
-        };
-        let seq = estimate.head().estimate_seq;
-        if seq != core::mem::replace(&mut self.last_seq, seq) {
-            self.latest.heard();
-        } else if let Some(now_ns) = self.seldom.now_ns() {
-            self.last = estimate;
-            self.latest.look(now_ns);
-        }
-        estimate
     }
 }

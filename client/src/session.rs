@@ -102,6 +102,17 @@ impl<E: Estimate> Session<E> {
     ///
     /// # Errors
     /// A port cannot be opened, the daemon has another model, or no daemon answers.
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use inekf_client::session::Session;
+    /// # use inekf_shared::message::EstimateSe2;
+    /// # use inekf_shared::topic::Instance;
+    /// // A daemon that moves in the plane; one of another model is an error that says so.
+    /// let session = Session::<EstimateSe2>::open(&Instance::new("cart")?)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open(instance: &Instance) -> anyhow::Result<Self> {
         let mut controller = Controller::open(instance, ANSWER_WITHIN)?;
         let reader = EstimateReader::open(instance)?;
@@ -289,6 +300,17 @@ impl<E: Estimate> Session<E> {
     }
 
     /// The requests, for what a session does not ask itself.
+    ///
+    /// It is not run here, for it needs a daemon, another process:
+    ///
+    /// ```no_run
+    /// # use inekf_client::session::Session;
+    /// # use inekf_shared::message::EstimateSe23;
+    /// # use inekf_shared::topic::Instance;
+    /// # let mut session = Session::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// session.controller().reset()?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn controller(&mut self) -> &mut Controller {
         &mut self.controller
     }

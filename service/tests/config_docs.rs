@@ -690,6 +690,8 @@ fn assert_heading(name: &str, config: &Config, row: &[f64]) {
     let (w, x, y, z) = (row[1], row[2], row[3], row[4]);
     let (r00, r10) = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z));
     let heading = r10.atan2(r00);
-    let off = (config.initial.heading_rad() - heading).abs().to_degrees();
+    let off = (config.initial.heading_deg.to_radians() - heading)
+        .abs()
+        .to_degrees();
     assert!(off < 0.01, "{name}: heading is off by {off} deg");
 }

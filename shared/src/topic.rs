@@ -71,6 +71,13 @@ impl Instance {
     }
 
     /// The name.
+    ///
+    /// ```
+    /// use inekf_shared::topic::Instance;
+    ///
+    /// assert_eq!(Instance::new("car-7")?.as_str(), "car-7");
+    /// # Ok::<(), inekf_shared::topic::InstanceError>(())
+    /// ```
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
@@ -159,6 +166,13 @@ impl Topic {
     ];
 
     /// The last part of the service name.
+    ///
+    /// ```
+    /// use inekf_shared::topic::{Instance, Topic};
+    ///
+    /// assert_eq!(Topic::Imu.name(), "imu");
+    /// assert!(Topic::Imu.service_name(&Instance::default()).ends_with("/imu"));
+    /// ```
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

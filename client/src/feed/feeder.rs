@@ -119,6 +119,23 @@ impl Feeder {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
+    ///
+    /// ```
+    /// use inekf_client::feed::Feeder;
+    /// use inekf_shared::topic::Instance;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().expect("a name");
+    /// # // SAFETY: this process has no other thread.
+    /// # unsafe {
+    /// #     std::env::set_var("INEKF_IPC_ROOT", root.path());
+    /// #     std::env::set_var("INEKF_IPC_PREFIX", prefix);
+    /// # }
+    /// // Where the daemon looks too, which may come later.
+    /// let feeder = Feeder::open(&Instance::new("car")?)?;
+    /// assert_eq!(feeder.reattached(), 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open(instance: &Instance) -> Result<Self, TransportError> {
         Self::open_on(transport::open_node(NODE)?, instance)
     }
@@ -127,6 +144,23 @@ impl Feeder {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
+    ///
+    /// ```
+    /// use inekf_client::feed::Feeder;
+    /// use inekf_shared::message::ImuSample;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// let car = Instance::new("car")?;
+    /// let feeder = Feeder::open_on(node()?, &car)?;
+    /// let daemon = node()?;
+    /// assert_eq!(transport::input::<ImuSample>(&daemon, &car)?.publisher_count(), 1);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open_on(node: Node, instance: &Instance) -> Result<Self, TransportError> {
         Ok(Self {
             ports: Attached::open(node, NODE, instance, Ports::open)?,
@@ -135,6 +169,21 @@ impl Feeder {
     }
 
     /// How often it attached anew because its files had been removed.
+    ///
+    /// ```
+    /// use inekf_client::feed::Feeder;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// let feeder = Feeder::open_on(node()?, &Instance::new("car")?)?;
+    /// // Nobody has removed a file of theirs yet.
+    /// assert_eq!(feeder.reattached(), 0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn reattached(&self) -> u64 {
         self.ports.times()
     }

@@ -118,6 +118,24 @@ impl<E: Estimate> Watcher<E> {
     ///
     /// # Errors
     /// A port cannot be opened, or the daemon has another model.
+    ///
+    /// ```
+    /// use inekf_client::monitor::Watcher;
+    /// use inekf_shared::message::EstimateSe23;
+    /// use inekf_shared::topic::Instance;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().expect("a name");
+    /// # // SAFETY: this process has no other thread.
+    /// # unsafe {
+    /// #     std::env::set_var("INEKF_IPC_ROOT", root.path());
+    /// #     std::env::set_var("INEKF_IPC_PREFIX", prefix);
+    /// # }
+    /// let mut watcher = Watcher::<EstimateSe23>::open(&Instance::new("car")?)?;
+    /// watcher.drain()?;
+    /// assert!(watcher.picture(inekf_client::monitor::PERIOD).health.is_none());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open(instance: &Instance) -> anyhow::Result<Self> {
         Self::open_on(
             transport::open_node(NODE)?,
@@ -130,6 +148,24 @@ impl<E: Estimate> Watcher<E> {
     ///
     /// # Errors
     /// As [`Watcher::open`].
+    ///
+    /// ```
+    /// use inekf_client::monitor::Watcher;
+    /// use inekf_client::read::EstimateReader;
+    /// use inekf_shared::message::EstimateSe2;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let instance = Instance::new("car")?;
+    /// let reader = EstimateReader::<EstimateSe2>::open_on(node()?, &instance)?;
+    /// let mut watcher = Watcher::open_on(node()?, reader, &instance)?;
+    /// assert_eq!(watcher.picture(inekf_client::monitor::PERIOD).instance, "car");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open_on(
         node: Node,
         estimates: EstimateReader<E>,
@@ -181,6 +217,31 @@ impl<E: Estimate> Watcher<E> {
     }
 
     /// The picture of the time since the last one, which took `elapsed`.
+    ///
+    /// ```
+    /// use inekf_client::monitor::Watcher;
+    /// use inekf_client::read::EstimateReader;
+    /// use inekf_shared::message::EstimateSe2;
+    /// use inekf_shared::topic::Instance;
+    /// use inekf_shared::transport;
+    ///
+    /// # let root = tempfile::tempdir_in("/tmp")?;
+    /// # let prefix = root.path().file_name().and_then(|name| name.to_str());
+    /// # let config = transport::config(root.path().to_str(), prefix)?;
+    /// # let node = || transport::open_node_with("doc", &config);
+    /// # let instance = Instance::new("car")?;
+    /// let reader = EstimateReader::<EstimateSe2>::open_on(node()?, &instance)?;
+    /// let mut watcher = Watcher::open_on(node()?, reader, &instance)?;
+    /// # use inekf_shared::message::Zero;
+    /// # let daemon = node()?;
+    /// # let estimates = transport::estimate::<EstimateSe2>(&daemon, &instance)?.publisher()?;
+    /// estimates.send_copy(EstimateSe2::ZERO)?;
+    /// watcher.drain()?;
+    /// // One in half a second.
+    /// let picture = watcher.picture(std::time::Duration::from_millis(500));
+    /// assert_eq!(picture.estimate_rate_hz, 2.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn picture(&mut self, elapsed: Duration) -> &Picture {
         let missed = self.estimates.missed();
         self.picture.finish(monotonic_ns(), elapsed, missed);

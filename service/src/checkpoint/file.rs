@@ -3,6 +3,22 @@
 //!
 //! It is written beside its place and renamed, so that at every moment there is a whole one or none. It is read as if
 //! it came from a stranger: whatever its bytes are, there is a state that was written, or the reason why there is none.
+//!
+//! ```
+//! use inekf_service::checkpoint::file::{Identity, load};
+//!
+//! let folder = tempfile::tempdir()?;
+//! let car = Identity {
+//!     instance: "car".to_owned(),
+//!     estimator: "inekf".to_owned(),
+//!     model: inekf_shared::message::MODEL_IMU,
+//!     dimension: 15,
+//!     mismatches: String::new(),
+//! };
+//! // None yet is no fault.
+//! assert_eq!(load(&folder.path().join("car.checkpoint"), &car)?, None);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
@@ -21,7 +37,7 @@ const MAX_BYTES: u64 = 64 * 1024;
 /// Whose state it is: a state is continued only by the same.
 ///
 /// ```
-/// use inekf_service::checkpoint::file::{Identity, Unusable, decode, encode};
+/// use inekf_service::checkpoint::file::{Identity, Unusable, encode, load};
 /// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
 ///
 /// let car = Identity {
@@ -32,11 +48,13 @@ const MAX_BYTES: u64 = 64 * 1024;
 ///     mismatches: String::new(),
 /// };
 /// let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
-/// let bytes = encode(&car, &state)?;
-/// assert_eq!(decode(&car, &bytes)?, state);
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("car.checkpoint");
+/// std::fs::write(&path, encode(&car, &state)?)?;
+/// assert_eq!(load(&path, &car)?, Some(state));
 /// // A state is continued by its own daemon, and by no other.
 /// let truck = Identity { instance: "truck".to_owned(), ..car };
-/// assert!(matches!(decode(&truck, &bytes), Err(Unusable::Foreign { .. })));
+/// assert!(matches!(load(&path, &truck), Err(Unusable::Foreign { .. })));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,7 +83,7 @@ struct Checkpoint {
 /// Why a checkpoint cannot be used.
 ///
 /// ```
-/// use inekf_service::checkpoint::file::{Identity, Unusable, decode};
+/// use inekf_service::checkpoint::file::{Identity, Unusable, load};
 /// use inekf_shared::message::MODEL_IMU;
 ///
 /// let car = Identity {
@@ -75,7 +93,13 @@ struct Checkpoint {
 ///     dimension: 15,
 ///     mismatches: String::new(),
 /// };
-/// assert!(matches!(decode(&car, b"half a fra"), Err(Unusable::Bad(_))));
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("car.checkpoint");
+/// std::fs::write(&path, b"half a fra")?;
+/// assert!(matches!(load(&path, &car), Err(Unusable::Bad(_))));
+/// // A folder is no file either.
+/// assert!(matches!(load(folder.path(), &car), Err(Unusable::NoFile)));
+/// # Ok::<(), std::io::Error>(())
 /// ```
 #[derive(Debug, thiserror::Error)]
 pub enum Unusable {
@@ -124,6 +148,24 @@ impl Identity {
 ///
 /// # Errors
 /// [`CodecError`]; a state of any numbers can be encoded.
+///
+/// ```
+/// use inekf_service::checkpoint::file::{Identity, encode};
+/// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+///
+/// let car = Identity {
+///     instance: "car".to_owned(),
+///     estimator: "inekf".to_owned(),
+///     model: MODEL_IMU,
+///     dimension: 15,
+///     mismatches: String::new(),
+/// };
+/// let bytes = encode(&car, &StateVector { stamp_ns: 7, ..StateVector::ZERO })?;
+/// // The same state has the same bytes, another one has others.
+/// assert_eq!(bytes, encode(&car, &StateVector { stamp_ns: 7, ..StateVector::ZERO })?);
+/// assert_ne!(bytes, encode(&car, &StateVector { stamp_ns: 8, ..StateVector::ZERO })?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn encode(identity: &Identity, state: &StateVector) -> Result<Vec<u8>, CodecError> {
     let checkpoint = Checkpoint {
         version: VERSION,
@@ -137,7 +179,7 @@ pub fn encode(identity: &Identity, state: &StateVector) -> Result<Vec<u8>, Codec
 ///
 /// # Errors
 /// [`Unusable`], if they are not whole or not of `identity`.
-pub fn decode(identity: &Identity, bytes: &[u8]) -> Result<StateVector, Unusable> {
+pub(super) fn decode(identity: &Identity, bytes: &[u8]) -> Result<StateVector, Unusable> {
     let Checkpoint {
         version,
         identity: found,
@@ -177,7 +219,7 @@ fn version_of(frame: &[u8]) -> Option<u32> {
 /// [`Unusable`], naming the reason.
 ///
 /// ```
-/// use inekf_service::checkpoint::file::{Identity, encode, load, store};
+/// use inekf_service::checkpoint::file::{Identity, encode, load};
 /// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
 ///
 /// let car = Identity {
@@ -192,7 +234,7 @@ fn version_of(frame: &[u8]) -> Option<u32> {
 /// // None yet is no fault.
 /// assert_eq!(load(&path, &car)?, None);
 /// let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
-/// store(&path, &encode(&car, &state)?)?;
+/// std::fs::write(&path, encode(&car, &state)?)?;
 /// assert_eq!(load(&path, &car)?, Some(state));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -218,20 +260,7 @@ pub fn load(path: &Path, identity: &Identity) -> Result<Option<StateVector>, Unu
 ///
 /// # Errors
 /// As the system says; what was at `path` is then still there.
-///
-/// ```
-/// use inekf_service::checkpoint::file::store;
-///
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("car.checkpoint");
-/// store(&path, b"first")?;
-/// store(&path, b"second")?;
-/// // Written beside and renamed: one file, whole, whenever one looks.
-/// assert_eq!(std::fs::read(&path)?, b"second");
-/// assert_eq!(std::fs::read_dir(folder.path())?.count(), 1);
-/// # Ok::<(), std::io::Error>(())
-/// ```
-pub fn store(path: &Path, bytes: &[u8]) -> io::Result<()> {
+pub(super) fn store(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let beside = beside(path);
     let written = OpenOptions::new()
         .write(true)
@@ -263,20 +292,7 @@ pub fn store(path: &Path, bytes: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 /// As the system says.
-///
-/// ```
-/// use inekf_service::checkpoint::file::{remove, store};
-///
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("car.checkpoint");
-/// store(&path, b"a state")?;
-/// remove(&path)?;
-/// // What is not there need not be removed.
-/// remove(&path)?;
-/// assert!(!path.exists());
-/// # Ok::<(), std::io::Error>(())
-/// ```
-pub fn remove(path: &Path) -> io::Result<()> {
+pub(super) fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),
@@ -466,5 +482,15 @@ mod tests {
         assert!(store(&path, &[]).is_err());
         assert_eq!(load(&path, &identity()).unwrap(), Some(state()));
         assert!(store(&folder.path().join("no/such/folder"), &bytes).is_err());
+    }
+
+    #[test]
+    fn what_is_not_there_need_not_be_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("car.checkpoint");
+        store(&path, b"a state").unwrap();
+        remove(&path).unwrap();
+        assert!(!path.exists());
+        remove(&path).unwrap();
     }
 }

@@ -4,6 +4,15 @@
 //! slot and to exchange it for the one between; to take is to exchange one's own for that one, if it is fresh. Both are
 //! a copy and one atomic exchange: no lock, no allocation, no system call. A value that is not taken before the next
 //! one is given is lost, as it should be.
+//!
+//! ```
+//! use inekf_service::checkpoint::handover::pair;
+//!
+//! let (mut giver, mut taker) = pair([0; 3]);
+//! let giving = std::thread::spawn(move || giver.give(&[1, 2, 3]));
+//! giving.join().expect("it is given");
+//! assert_eq!(taker.take(), Some([1, 2, 3]));
+//! ```
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicUsize, Ordering};
@@ -26,6 +35,16 @@ struct Shared<T> {
 unsafe impl<T: Send> Sync for Shared<T> {}
 
 /// The side that gives.
+///
+/// ```
+/// use inekf_service::checkpoint::handover::pair;
+///
+/// let (mut giver, taker) = pair('a');
+/// // It does not mind whether anybody takes.
+/// drop(taker);
+/// giver.give(&'b');
+/// assert!(format!("{giver:?}").starts_with("Giver"));
+/// ```
 #[derive(Debug)]
 pub struct Giver<T> {
     shared: Arc<Shared<T>>,
@@ -33,6 +52,15 @@ pub struct Giver<T> {
 }
 
 /// The side that takes.
+///
+/// ```
+/// use inekf_service::checkpoint::handover::pair;
+///
+/// let (giver, mut taker) = pair('a');
+/// // Nor does this one mind whether anybody gives.
+/// drop(giver);
+/// assert_eq!(taker.take(), None);
+/// ```
 #[derive(Debug)]
 pub struct Taker<T> {
     shared: Arc<Shared<T>>,
@@ -65,6 +93,15 @@ pub fn pair<T: Copy + Send>(blank: T) -> (Giver<T>, Taker<T>) {
 
 impl<T: Copy + Send> Giver<T> {
     /// Gives `value`; one that was given before and not taken is lost.
+    ///
+    /// ```
+    /// use inekf_service::checkpoint::handover::pair;
+    ///
+    /// let (mut giver, mut taker) = pair(0);
+    /// giver.give(&1);
+    /// giver.give(&2);
+    /// assert_eq!(taker.take(), Some(2));
+    /// ```
     pub fn give(&mut self, value: &T) {
         // SAFETY: nobody else touches the slot whose index this side holds.
         unsafe { *self.shared.slots[self.own].get() = *value };
@@ -75,6 +112,14 @@ impl<T: Copy + Send> Giver<T> {
 
 impl<T: Copy + Send> Taker<T> {
     /// The newest value, if it has not been taken.
+    ///
+    /// ```
+    /// use inekf_service::checkpoint::handover::pair;
+    ///
+    /// let (mut giver, mut taker) = pair(0);
+    /// giver.give(&1);
+    /// assert_eq!((taker.take(), taker.take()), (Some(1), None));
+    /// ```
     pub fn take(&mut self) -> Option<T> {
         if self.shared.between.load(Ordering::Relaxed) & FRESH == 0 {
             return None;

@@ -5,6 +5,27 @@
 //! said in the log once until it works again. A state that was forgotten, by a reset or a jump of the clock, is
 //! forgotten on the disk too. What the next start does with the state is
 //! [`crate::engine::resume`]'s.
+//!
+//! ```
+//! use inekf_service::checkpoint::Keeper;
+//! use inekf_service::checkpoint::file::{Identity, load};
+//! use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+//!
+//! let car = Identity {
+//!     instance: "car".to_owned(),
+//!     estimator: "inekf".to_owned(),
+//!     model: MODEL_IMU,
+//!     dimension: 15,
+//!     mismatches: String::new(),
+//! };
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("car.checkpoint");
+//! let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
+//! Keeper::start(path.clone(), car.clone(), 1_000_000_000, 0)?.finish(Some(state));
+//! // The next start reads it.
+//! assert_eq!(load(&path, &car)?, Some(state));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod file;
 pub mod handover;
@@ -79,6 +100,28 @@ impl Keeper {
     ///
     /// # Errors
     /// There is no thread to be had.
+    ///
+    /// ```
+    /// use inekf_service::checkpoint::Keeper;
+    /// use inekf_service::checkpoint::file::{Identity, load};
+    /// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+    ///
+    /// # let car = Identity {
+    /// #     instance: "car".to_owned(),
+    /// #     estimator: "inekf".to_owned(),
+    /// #     model: MODEL_IMU,
+    /// #     dimension: 15,
+    /// #     mismatches: String::new(),
+    /// # };
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("car.checkpoint");
+    /// # let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
+    /// let keeper = Keeper::start(path.clone(), car, 1_000_000_000, 0)?;
+    /// // Nothing is written before there is a state.
+    /// keeper.finish(None);
+    /// assert!(!path.exists());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn start(
         path: PathBuf,
         identity: Identity,
@@ -117,6 +160,33 @@ impl Keeper {
 
     /// Takes the state for a checkpoint, if one is due at `now_ns` (CLOCK_MONOTONIC) and `state` has another than the
     /// last; none, where there was one, removes the file. Neither waits nor allocates.
+    ///
+    /// ```
+    /// use inekf_service::checkpoint::Keeper;
+    /// use inekf_service::checkpoint::file::{Identity, load};
+    /// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+    ///
+    /// # let car = Identity {
+    /// #     instance: "car".to_owned(),
+    /// #     estimator: "inekf".to_owned(),
+    /// #     model: MODEL_IMU,
+    /// #     dimension: 15,
+    /// #     mismatches: String::new(),
+    /// # };
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("car.checkpoint");
+    /// # let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
+    /// let mut keeper = Keeper::start(path, car, 1_000_000_000, 500)?;
+    /// // One second after the last: not asked for.
+    /// keeper.keep(499, || panic!("it is not due"));
+    /// let mut is_asked_for = false;
+    /// keeper.keep(500, || {
+    ///     is_asked_for = true;
+    ///     Some(state)
+    /// });
+    /// assert!(is_asked_for);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn keep(&mut self, now_ns: u64, state: impl FnOnce() -> Option<StateVector>) {
         if now_ns < self.next_ns {
             return;
@@ -130,6 +200,27 @@ impl Keeper {
     }
 
     /// Checkpoints written, and those that could not be.
+    ///
+    /// ```
+    /// use inekf_service::checkpoint::Keeper;
+    /// use inekf_service::checkpoint::file::{Identity, load};
+    /// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+    ///
+    /// # let car = Identity {
+    /// #     instance: "car".to_owned(),
+    /// #     estimator: "inekf".to_owned(),
+    /// #     model: MODEL_IMU,
+    /// #     dimension: 15,
+    /// #     mismatches: String::new(),
+    /// # };
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("car.checkpoint");
+    /// # let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
+    /// let keeper = Keeper::start(path, car, 1_000_000_000, 0)?;
+    /// // Health carries them.
+    /// assert_eq!(keeper.counts(), (0, 0));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn counts(&self) -> (u64, u64) {
         let of = |count: &AtomicU64| count.load(Ordering::Relaxed);
         (of(&self.counts.written), of(&self.counts.failed))
@@ -137,6 +228,28 @@ impl Keeper {
 
     /// Writes the last checkpoint, and waits for it, but not for long. If there has never been a state, the file stays
     /// as it is.
+    ///
+    /// ```
+    /// use inekf_service::checkpoint::Keeper;
+    /// use inekf_service::checkpoint::file::{Identity, load};
+    /// use inekf_shared::message::{MODEL_IMU, StateVector, Zero};
+    ///
+    /// # let car = Identity {
+    /// #     instance: "car".to_owned(),
+    /// #     estimator: "inekf".to_owned(),
+    /// #     model: MODEL_IMU,
+    /// #     dimension: 15,
+    /// #     mismatches: String::new(),
+    /// # };
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("car.checkpoint");
+    /// # let state = StateVector { model: MODEL_IMU, dimension: 15, stamp_ns: 7, ..StateVector::ZERO };
+    /// let keeper = Keeper::start(path.clone(), car.clone(), 1_000_000_000, 0)?;
+    /// // It is on the disk when this is back.
+    /// keeper.finish(Some(state));
+    /// assert_eq!(load(&path, &car)?, Some(state));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn finish(mut self, state: Option<StateVector>) {
         if state != self.given {
             self.giver.give(&state);
@@ -206,28 +319,7 @@ impl Writer {
 
 /// The state of the last life, if there is a checkpoint that can be used; and whether there is one that cannot, of
 /// which the log then says why.
-///
-/// ```
-/// use inekf_service::checkpoint::file::{Identity, store};
-/// use inekf_service::checkpoint::{Unused, last_state};
-/// use inekf_shared::message::MODEL_IMU;
-///
-/// let car = Identity {
-///     instance: "car".to_owned(),
-///     estimator: "inekf".to_owned(),
-///     model: MODEL_IMU,
-///     dimension: 15,
-///     mismatches: String::new(),
-/// };
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("car.checkpoint");
-/// assert_eq!(last_state(&path, &car), Ok(None));
-/// // One that is there and is no good is another matter: health says so.
-/// store(&path, b"not a checkpoint")?;
-/// assert_eq!(last_state(&path, &car), Err(Unused));
-/// # Ok::<(), std::io::Error>(())
-/// ```
-pub fn last_state(path: &Path, identity: &Identity) -> Result<Option<StateVector>, Unused> {
+pub(crate) fn last_state(path: &Path, identity: &Identity) -> Result<Option<StateVector>, Unused> {
     match file::load(path, identity) {
         Ok(None) => {
             info!(path = %path.display(), "no checkpoint yet: starting as configured");
@@ -243,7 +335,7 @@ pub fn last_state(path: &Path, identity: &Identity) -> Result<Option<StateVector
 
 /// There is a checkpoint, and it is not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Unused;
+pub(crate) struct Unused;
 
 #[cfg(test)]
 mod tests {

@@ -12,7 +12,7 @@ pub(super) trait Choice: Copy + 'static {
     const NOT_BUILT: &'static [&'static str];
 }
 
-/// Declares an enum of named settings, with `as_str`, `parse` and `Display`.
+/// Declares an enum of named settings, with `as_str` and `Display`.
 macro_rules! choice {
     (
         $(#[$doc:meta])*
@@ -30,13 +30,8 @@ macro_rules! choice {
 
         impl $Name {
             /// The name as the configuration file has it.
-            pub const fn as_str(self) -> &'static str {
+            pub(super) const fn as_str(self) -> &'static str {
                 match self { $($Name::$Variant => $name,)+ }
-            }
-
-            /// The setting of that name; None for any other text.
-            pub fn parse(name: &str) -> Option<Self> {
-                Self::NAMES.iter().find(|(_, known)| *known == name).map(|&(setting, _)| setting)
             }
         }
 
@@ -55,9 +50,7 @@ choice! {
     /// use inekf_service::config::Model;
     ///
     /// // As the file has it: `model = "odometry2d"`.
-    /// assert_eq!(Model::parse("odometry2d"), Some(Model::Odometry2d));
     /// assert_eq!(Model::Odometry2d.to_string(), "odometry2d");
-    /// assert_eq!(Model::parse("boat"), None);
     /// ```
     pub enum Model {
         /// Inertial navigation: attitude, velocity, position and biases from an IMU.
@@ -100,6 +93,13 @@ choice! {
 
 choice! {
     /// What the states that have left the smoother's window leave behind.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let text = format!("estimator = 'smoother'\n{IMU}[smoother]\nprior = 'linear'\n");
+    /// assert_eq!(read(text)?.smoother.map(|smoother| smoother.prior), Some(Prior::Linear));
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum Prior {
         /// A mean on the group, and a frozen covariance.
         Group = "group",
@@ -112,6 +112,13 @@ choice! {
 
 choice! {
     /// How the smoother attaches a correction to a state.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let text = format!("estimator = 'smoother'\n{IMU}[smoother]\nparametrisation = 'gtsam'\n");
+    /// assert_eq!(read(text)?.smoother.map(|smoother| smoother.parametrisation), Some(Parametrisation::Gtsam));
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum Parametrisation {
         /// By the exponential of the group, in body coordinates: invariant smoothing.
         Exponential = "exponential",
@@ -126,6 +133,13 @@ choice! {
 
 choice! {
     /// How the smoother takes the derivatives of the residuals of motions and of its first prior.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let text = format!("estimator = 'smoother'\n{IMU}[smoother]\njacobians = 'exact'\n");
+    /// assert_eq!(read(text)?.smoother.map(|smoother| smoother.jacobians), Some(Jacobians::Exact));
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum Jacobians {
         /// As if the residuals were zero: the gains are constants where the state has no biases.
         Frozen = "frozen",
@@ -154,6 +168,15 @@ choice! {
 
 choice! {
     /// What the estimator does about the declared mismatches.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let text = format!("mismatch = 'augmented'\n{ODOMETRY}[[mismatched]]\nwhat = 'odometry_scale'\nsigma = 0.05\n");
+    /// assert_eq!(read(text)?.mismatch, Mismatch::Augmented);
+    /// // With nothing declared the model is taken to be right.
+    /// assert_eq!(read(ODOMETRY.to_owned())?.mismatch, Mismatch::None);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum Mismatch {
         /// The model is taken to be right.
         None = "none",
@@ -172,6 +195,14 @@ choice! {
 
 choice! {
     /// What a declared mismatch is about.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// assert_eq!(MismatchKind::OdometryScale.to_string(), "odometry_scale");
+    /// let text = format!("mismatch = 'augmented'\n{ODOMETRY}[[mismatched]]\nwhat = 'odometry_scale'\nsigma = 0.05\n");
+    /// assert_eq!(read(text)?.mismatched[0].what, Wrong::OdometryScale);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum MismatchKind {
         /// The translation of every row is too long or too short by one factor.
         OdometryScale = "odometry_scale",
@@ -188,6 +219,14 @@ choice! {
 
 choice! {
     /// An axis of the body or of the world.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// // In the plane there is one axis to turn about.
+    /// let text = format!("mismatch = 'augmented'\n{ODOMETRY}[[mismatched]]\nwhat = 'odometry_rotation_bias'\nsigma = 0.01\n");
+    /// assert_eq!(read(text)?.mismatched[0].what, Wrong::OdometryRotationBias { axis: Axis::Z });
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum Axis {
         /// Forward, or east.
         X = "x",
@@ -200,6 +239,12 @@ choice! {
 
 choice! {
     /// What happens to a fix whose stacking partner does not come.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// assert_eq!(MissingPartner::Skip.to_string(), "skip");
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum MissingPartner {
         /// It is fused alone, with the ordinary gain.
         Unconstrained = "unconstrained",
@@ -210,6 +255,13 @@ choice! {
 
 choice! {
     /// Which gain goes with the covariance of the H-infinity filter.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let text = format!("estimator = 'invariant-hinf'\n{ODOMETRY}[hinf]\ngamma = 0.01\ngain = 'kalman'\n");
+    /// assert_eq!(read(text)?.hinf.map(|hinf| hinf.gain), Some(HinfGain::Kalman));
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum HinfGain {
         /// The gain that belongs to the widened covariance.
         Widened = "widened",
@@ -220,6 +272,14 @@ choice! {
 
 choice! {
     /// How the continuous motion is stepped over one sample.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// // Exact, unless the papers' steps are asked for.
+    /// assert_eq!(inertial(IMU.to_owned())?.discretisation, Discretisation::Zoh);
+    /// assert_eq!(inertial(format!("discretisation = 'euler'\n{IMU}"))?.discretisation, Discretisation::Euler);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum Discretisation {
         /// Exact for an input that is constant over the interval.
         Zoh = "zoh",
@@ -232,9 +292,10 @@ choice! {
     /// Which interval an IMU sample speaks for.
     ///
     /// ```
-    /// use inekf_service::config::Hold;
-    ///
-    /// assert_eq!(Hold::parse("backward").map(Hold::as_str), Some("backward"));
+    #[doc = include_str!("example.txt")]
+    /// assert_eq!(inertial(IMU.to_owned())?.hold, Hold::Backward);
+    /// assert_eq!(inertial(format!("hold = 'midpoint'\n{IMU}"))?.hold, Hold::Midpoint);
+    /// # Ok::<(), ConfigFaults>(())
     /// ```
     pub enum Hold {
         /// The interval that ends at its stamp.
@@ -248,6 +309,13 @@ choice! {
 
 choice! {
     /// What happens when the IMU or the odometry was silent for longer than its `max_gap_s`.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let text = format!("{IMU}[imu]\non_gap = 'reinitialise'\n");
+    /// assert_eq!(inertial(text)?.imu.on_gap, GapPolicy::Reinitialise);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum GapPolicy {
         /// Propagate over the gap with inflated noise.
         Inflate = "inflate",
@@ -258,6 +326,14 @@ choice! {
 
 choice! {
     /// Where the initial roll and pitch come from.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// // An accelerometer feels which way is up; odometry does not.
+    /// assert_eq!(read(IMU.to_owned())?.initial.level, Level::Accelerometer);
+    /// assert_eq!(read(ODOMETRY.to_owned())?.initial.level, Level::Given);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum Level {
         /// The direction of the mean specific force over `initial.level_window_s`.
         Accelerometer = "accelerometer",
@@ -268,6 +344,13 @@ choice! {
 
 choice! {
     /// How the covariance reaches the new linearisation point after an update.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let text = format!("{IMU}[update]\niterations = 1\ntransport = 'none'\n");
+    /// assert_eq!(read(text)?.update.transport, Transport::None);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum Transport {
         /// By the right Jacobian of the group.
         Jacobian = "jacobian",
@@ -278,6 +361,12 @@ choice! {
 
 choice! {
     /// How a fix that comes after later samples is fused.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// assert_eq!(read(format!("{IMU}[late]\nmethod = 'replay'\n"))?.late.method, LateMethod::Replay);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub enum LateMethod {
         /// What it corrects is carried to the newest state in constant time where that is exact and cheaper; elsewhere
         /// the samples since are replayed.
@@ -309,39 +398,36 @@ choice! {
 mod tests {
     use super::*;
 
-    fn names_are_one_to_one<T: Choice + PartialEq + std::fmt::Debug>(
-        as_str: fn(T) -> &'static str,
-        parse: fn(&str) -> Option<T>,
-    ) {
+    fn names_are_one_to_one<T: Choice + std::fmt::Display>() {
+        let not_built = T::NOT_BUILT.iter().copied();
+        let mut names: Vec<&str> = not_built.collect();
         for &(setting, name) in T::NAMES {
-            assert_eq!(as_str(setting), name);
-            assert_eq!(parse(name), Some(setting));
-            assert_eq!(parse(&name.to_uppercase()), None, "names are lower case");
+            assert_eq!(setting.to_string(), name);
+            assert_eq!(name, name.to_lowercase());
+            assert!(!names.contains(&name), "{name} twice");
+            names.push(name);
         }
-        for name in T::NOT_BUILT {
-            assert_eq!(parse(name), None, "{name} is not built");
-        }
-        assert_eq!(parse(""), None);
     }
 
     #[test]
-    fn every_enum_reads_back_its_own_names() {
-        names_are_one_to_one(Model::as_str, Model::parse);
-        names_are_one_to_one(Estimator::as_str, Estimator::parse);
-        names_are_one_to_one(Invariance::as_str, Invariance::parse);
-        names_are_one_to_one(Mismatch::as_str, Mismatch::parse);
-        names_are_one_to_one(MismatchKind::as_str, MismatchKind::parse);
-        names_are_one_to_one(Prior::as_str, Prior::parse);
-        names_are_one_to_one(Parametrisation::as_str, Parametrisation::parse);
-        names_are_one_to_one(Jacobians::as_str, Jacobians::parse);
-        names_are_one_to_one(Axis::as_str, Axis::parse);
-        names_are_one_to_one(MissingPartner::as_str, MissingPartner::parse);
-        names_are_one_to_one(HinfGain::as_str, HinfGain::parse);
-        names_are_one_to_one(Discretisation::as_str, Discretisation::parse);
-        names_are_one_to_one(Hold::as_str, Hold::parse);
-        names_are_one_to_one(GapPolicy::as_str, GapPolicy::parse);
-        names_are_one_to_one(Level::as_str, Level::parse);
-        names_are_one_to_one(Transport::as_str, Transport::parse);
-        names_are_one_to_one(WaitMode::as_str, WaitMode::parse);
+    fn no_two_settings_have_one_name() {
+        names_are_one_to_one::<Model>();
+        names_are_one_to_one::<Estimator>();
+        names_are_one_to_one::<Invariance>();
+        names_are_one_to_one::<Mismatch>();
+        names_are_one_to_one::<MismatchKind>();
+        names_are_one_to_one::<Prior>();
+        names_are_one_to_one::<Parametrisation>();
+        names_are_one_to_one::<Jacobians>();
+        names_are_one_to_one::<Axis>();
+        names_are_one_to_one::<MissingPartner>();
+        names_are_one_to_one::<HinfGain>();
+        names_are_one_to_one::<Discretisation>();
+        names_are_one_to_one::<Hold>();
+        names_are_one_to_one::<GapPolicy>();
+        names_are_one_to_one::<Level>();
+        names_are_one_to_one::<Transport>();
+        names_are_one_to_one::<LateMethod>();
+        names_are_one_to_one::<WaitMode>();
     }
 }

@@ -14,12 +14,12 @@ pub(super) struct Filter {
 
 impl Estimator {
     /// Whether its error is additive, `theta` and `x` by themselves, instead of an element of the group.
-    pub const fn is_additive(self) -> bool {
+    const fn is_additive(self) -> bool {
         matches!(self, Self::Ekf | Self::LcEkf)
     }
 
     /// Whether its gain is constrained against mismatches.
-    pub const fn is_constrained(self) -> bool {
+    const fn is_constrained(self) -> bool {
         matches!(self, Self::LcInekf | Self::LcEkf)
     }
 

@@ -5,7 +5,7 @@ use inekf_shared::topic::Instance;
 use super::section::Section;
 
 /// Vehicles in one daemon, at most.
-pub const MAX_VEHICLES: usize = 4096;
+const MAX_VEHICLES: usize = 4096;
 
 /// The vehicles of one daemon; each is an instance of its own, with topics of its own.
 ///

@@ -5,6 +5,16 @@ use super::interval::Interval;
 use super::section::Section;
 
 /// The H-infinity filter.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let text = format!("estimator = 'invariant-hinf'\n{ODOMETRY}[hinf]\ngamma = 0.01\n");
+/// let hinf = read(text)?.hinf.expect("it is the estimator");
+/// assert_eq!((hinf.gamma, hinf.gain), (0.01, HinfGain::Widened));
+/// // It is there if and only if it is asked for.
+/// assert!(read(format!("{ODOMETRY}[hinf]\ngamma = 0.01\n")).is_err());
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hinf {
     /// Bound on the amplification of disturbances, 1/rad^2 and 1/m^2; 0 is the Kalman filter.

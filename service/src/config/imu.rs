@@ -6,6 +6,13 @@ use super::operation::nanoseconds;
 use super::section::Section;
 
 /// Checks on the IMU's samples.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let imu = inertial(format!("{IMU}[imu]\nmax_gyro_rps = 8.7\n"))?.imu;
+/// assert_eq!((imu.max_gyro_rps, imu.max_gap_s), (8.7, 0.5));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imu {
     /// The longest time between two samples that is still propagated over as usual, s.
@@ -29,7 +36,7 @@ impl Imu {
     }
 
     /// [`max_gap_s`](Self::max_gap_s) in nanoseconds of sensor time.
-    pub fn max_gap_ns(&self) -> u64 {
+    pub(crate) fn max_gap_ns(&self) -> u64 {
         nanoseconds(self.max_gap_s)
     }
 }

@@ -1,6 +1,6 @@
 //! `[initial]`: the first estimate and how much it is trusted.
 //!
-//! Angles are kept in degrees, as people write them; the accessors give radians. Heading is counter-clockwise from
+//! Angles are kept in degrees, as people write them. Heading is counter-clockwise from
 //! east, `atan2(R10, R00)` of the body-to-world rotation; roll and pitch complete it as `R = Rz(heading) Ry(pitch)
 //! Rx(roll)`. Standard deviations are per axis.
 
@@ -10,6 +10,14 @@ use super::motion::ONLY_IMU;
 use super::section::Section;
 
 /// The initial state and its standard deviations.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let initial = read(format!("{IMU}[initial]\nheading_deg = 90.0\nheading_sigma_deg = 5.0\n"))?.initial;
+/// // North, as counted from east; where it is comes from the first position fix.
+/// assert_eq!((initial.heading_deg, initial.position_m), (90.0, None));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Initial {
     /// Heading, deg counter-clockwise from east.
@@ -139,31 +147,6 @@ impl Initial {
                 }
             }
         }
-    }
-
-    /// Heading, rad counter-clockwise from east.
-    pub fn heading_rad(&self) -> f64 {
-        self.heading_deg.to_radians()
-    }
-
-    /// Standard deviation of the heading, rad.
-    pub fn heading_sigma_rad(&self) -> f64 {
-        self.heading_sigma_deg.to_radians()
-    }
-
-    /// Roll, rad.
-    pub fn roll_rad(&self) -> f64 {
-        self.roll_deg.to_radians()
-    }
-
-    /// Pitch, rad, positive with the nose down.
-    pub fn pitch_rad(&self) -> f64 {
-        self.pitch_deg.to_radians()
-    }
-
-    /// Standard deviation of roll and of pitch, rad.
-    pub fn level_sigma_rad(&self) -> f64 {
-        self.level_sigma_deg.to_radians()
     }
 }
 

@@ -7,6 +7,16 @@ use super::operation::nanoseconds;
 use super::section::Section;
 
 /// The newest state on disk, for the next start.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let text = format!("{IMU}[checkpoint]\npath = '/var/lib/inekf/{{instance}}.checkpoint'\n");
+/// let checkpoint = read(text)?.checkpoint;
+/// assert_eq!((checkpoint.period_s, checkpoint.max_age_s), (1.0, 10.0));
+/// // Without a file there are none.
+/// assert_eq!(read(IMU.to_owned())?.checkpoint.path, None);
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
     /// The file; without one there are no checkpoints.
@@ -24,6 +34,13 @@ pub struct Checkpoint {
 }
 
 /// What the daemon publishes about its inputs.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// assert!(!read(IMU.to_owned())?.journal.publish);
+/// assert!(read(format!("{IMU}[journal]\npublish = true\n"))?.journal.publish);
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Journal {
     /// Whether everything that the engine takes is published in its order, to be recorded.
@@ -64,12 +81,12 @@ impl Checkpoint {
     }
 
     /// [`period_s`](Self::period_s) in nanoseconds.
-    pub fn period_ns(&self) -> u64 {
+    pub(crate) fn period_ns(&self) -> u64 {
         nanoseconds(self.period_s)
     }
 
     /// [`max_age_s`](Self::max_age_s) in nanoseconds of sensor time.
-    pub fn max_age_ns(&self) -> u64 {
+    pub(crate) fn max_age_ns(&self) -> u64 {
         nanoseconds(self.max_age_s)
     }
 }

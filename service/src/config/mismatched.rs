@@ -14,6 +14,14 @@ use super::section::Section;
 const ODOMETRY_BURST_SIGMAS: f64 = 3.0;
 
 /// One declared mismatch.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let text = format!("mismatch = 'consider'\n{ODOMETRY}[[position_source]]\nid = 3\n[[mismatched]]\nwhat = 'odometry_scale'\nsigma = 0.05\n");
+/// let mismatched = read(text)?.mismatched;
+/// assert_eq!((mismatched[0].what, mismatched[0].sigma), (Wrong::OdometryScale, 0.05));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mismatched {
     /// What is wrong.
@@ -27,6 +35,13 @@ pub struct Mismatched {
 }
 
 /// What a mismatch is about.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let text = format!("mismatch = 'consider'\n{ODOMETRY}[[position_source]]\nid = 3\n[[mismatched]]\nwhat = 'measurement_scale'\nsource = 3\nsigma = 0.05\n");
+/// assert_eq!(read(text)?.mismatched[0].what, Wrong::MeasurementScale { source: 3 });
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrong {
     /// The translation of a row is `(1 + m) u`.
@@ -53,7 +68,7 @@ pub enum Wrong {
 }
 
 /// What the parameters are that a filter learns beside the pose; empty if it learns none.
-pub fn learned_in_words(mismatch: Mismatch, mismatched: &[Mismatched]) -> String {
+pub(crate) fn learned_in_words(mismatch: Mismatch, mismatched: &[Mismatched]) -> String {
     match mismatch {
         Mismatch::Consider | Mismatch::Augmented | Mismatch::Adaptive => {
             let whats: Vec<String> = mismatched.iter().map(|one| one.what.in_words()).collect();
@@ -83,6 +98,15 @@ impl Wrong {
     }
 
     /// How many parameters it has.
+    ///
+    /// ```
+    /// use inekf_service::config::{Axis, Wrong};
+    ///
+    /// assert_eq!(Wrong::OdometryScale.parameters(), 1);
+    /// // About one axis, or about any.
+    /// assert_eq!(Wrong::MeasurementRotation { source: 0, axis: Some(Axis::Z) }.parameters(), 1);
+    /// assert_eq!(Wrong::MeasurementRotation { source: 0, axis: None }.parameters(), 3);
+    /// ```
     pub const fn parameters(self) -> usize {
         match self {
             Self::MeasurementRotation { axis: None, .. } => 3,
@@ -91,6 +115,13 @@ impl Wrong {
     }
 
     /// The id of the source of position that it is about; None if it is about the odometry.
+    ///
+    /// ```
+    /// use inekf_service::config::Wrong;
+    ///
+    /// assert_eq!(Wrong::MeasurementScale { source: 3 }.source(), Some(3));
+    /// assert_eq!(Wrong::OdometryScale.source(), None);
+    /// ```
     pub const fn source(self) -> Option<u32> {
         match self {
             Self::MeasurementScale { source } | Self::MeasurementRotation { source, .. } => {

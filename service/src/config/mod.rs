@@ -1,6 +1,6 @@
 //! The daemon's configuration: a TOML file, read whole, refused whole if anything in it is wrong.
 //!
-//! [`Config`] is plain data in SI units (angles in degrees where a name ends in `_deg`, with accessors in radians).
+//! [`Config`] is plain data in SI units (angles in degrees where a name ends in `_deg`).
 //! `CONFIG.md` in this crate documents every key; a test holds it, the example file and this reader together.
 //!
 //! A file is never half understood: unknown keys, wrong types, values out of range or not finite, missing keys and
@@ -57,13 +57,14 @@ pub use choice::{
     WaitMode,
 };
 pub use fault::{ConfigFaults, Fault};
-pub use fleet::{Fleet, MAX_VEHICLES, expand};
+pub use fleet::{Fleet, expand};
 pub use hinf::Hinf;
 pub use imu::Imu;
 pub use initial::Initial;
 pub use keeping::{Checkpoint, Journal};
 pub use load::MAX_FILE_BYTES;
-pub use mismatched::{Mismatched, Wrong, learned_in_words};
+pub(crate) use mismatched::learned_in_words;
+pub use mismatched::{Mismatched, Wrong};
 pub use motion::{Inertial, Motion, Odometry};
 pub use noise::{IncrementNoise, InertialNoise, OdometryNoise, RowSigmas, WhiteNoise};
 pub use odometry::Rows;
@@ -134,6 +135,15 @@ pub struct Config {
 
 impl Config {
     /// The dimension of the error of the estimated motion, without parameters of mismatches.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// // Rotation, velocity, position and two biases; without them; heading and position.
+    /// assert_eq!(read(IMU.to_owned())?.error_states(), 15);
+    /// assert_eq!(read(format!("biases = false\n{IMU}"))?.error_states(), 9);
+    /// assert_eq!(read(ODOMETRY.to_owned())?.error_states(), 3);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub fn error_states(&self) -> usize {
         match (&self.motion, self.model) {
             (Motion::Inertial(inertial), _) if inertial.biases => 15,

@@ -16,6 +16,13 @@ pub(super) const ONLY_ODOMETRY: &str =
     "only for models \"odometry3d\" and \"odometry2d\": remove it";
 
 /// The sensor of motion.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// assert!(matches!(read(IMU.to_owned())?.motion, Motion::Inertial(_)));
+/// assert!(matches!(read(ODOMETRY.to_owned())?.motion, Motion::Odometry(_)));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
     /// An IMU: [`Model::Imu`].
@@ -25,6 +32,14 @@ pub enum Motion {
 }
 
 /// Inertial navigation.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let inertial = inertial(format!("gravity_mps2 = 9.81\n{IMU}[[velocity_source]]\nid = 0\n"))?;
+/// assert_eq!((inertial.gravity_mps2, inertial.velocity_sources.len()), (9.81, 1));
+/// assert!(inertial.biases && inertial.zero_velocity.is_none());
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inertial {
     /// Whether the IMU's biases are part of the state: 15 error states with them, 9 without.
@@ -48,6 +63,13 @@ pub struct Inertial {
 }
 
 /// Motion by odometry.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let odometry = odometry(format!("{ODOMETRY}[odometry]\nmax_gap_s = 0.5\n"))?;
+/// assert_eq!(odometry.rows.max_gap_s, 0.5);
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Odometry {
     /// Checks on the rows.
@@ -175,7 +197,7 @@ impl Default for Inertial {
 
 impl Model {
     /// Whether the motion comes from increments of odometry.
-    pub const fn is_odometry(self) -> bool {
+    pub(super) const fn is_odometry(self) -> bool {
         matches!(self, Self::Odometry3d | Self::Odometry2d)
     }
 }

@@ -6,6 +6,13 @@ use super::operation::nanoseconds;
 use super::section::Section;
 
 /// Checks on the rows of odometry: each is the motion of the body since the row before.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let rows = odometry(format!("{ODOMETRY}[odometry]\nmax_translation_m = 2.0\n"))?.rows;
+/// assert_eq!((rows.max_translation_m, rows.on_gap), (2.0, GapPolicy::Inflate));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rows {
     /// The longest time between two rows that is still propagated over as usual, s.
@@ -43,11 +50,23 @@ impl Rows {
     }
 
     /// [`max_gap_s`](Self::max_gap_s) in nanoseconds of sensor time.
+    ///
+    /// ```
+    /// use inekf_service::config::Rows;
+    ///
+    /// assert_eq!(Rows { max_gap_s: 0.25, ..Rows::default() }.max_gap_ns(), 250_000_000);
+    /// ```
     pub fn max_gap_ns(&self) -> u64 {
         nanoseconds(self.max_gap_s)
     }
 
     /// [`first_period_s`](Self::first_period_s) in nanoseconds of sensor time.
+    ///
+    /// ```
+    /// use inekf_service::config::Rows;
+    ///
+    /// assert_eq!(Rows { first_period_s: 0.02, ..Rows::default() }.first_period_ns(), 20_000_000);
+    /// ```
     pub fn first_period_ns(&self) -> u64 {
         nanoseconds(self.first_period_s)
     }

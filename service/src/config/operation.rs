@@ -7,6 +7,13 @@ use super::interval::Interval;
 use super::section::Section;
 
 /// Measurements that arrive after later samples.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let late = read(format!("{IMU}[late]\nwindow_s = 0.25\n"))?.late;
+/// assert_eq!((late.window_s, late.method), (0.25, LateMethod::Carry));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Late {
     /// A fix this late is still fused; one that is later is counted and dropped, s.
@@ -18,6 +25,13 @@ pub struct Late {
 }
 
 /// When the estimate is called degraded or stale, and how often that is published.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let health = read(format!("{IMU}[health]\ndegraded_after_s = 2.0\n"))?.health;
+/// assert_eq!((health.degraded_after_s, health.period_s), (2.0, 1.0));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Health {
     /// Without an accepted fix for this long the estimate is degraded, s of sensor time.
@@ -29,6 +43,13 @@ pub struct Health {
 }
 
 /// The estimation thread.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let runtime = read(format!("{IMU}[runtime]\nwait = 'spin'\ncpu = 3\n"))?.runtime;
+/// assert_eq!((runtime.wait, runtime.cpu, runtime.priority), (WaitMode::Spin, Some(3), None));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Runtime {
     /// How it waits for samples.
@@ -53,6 +74,12 @@ impl Late {
     }
 
     /// The window in nanoseconds of sensor time.
+    ///
+    /// ```
+    /// use inekf_service::config::Late;
+    ///
+    /// assert_eq!(Late { window_s: 0.25, ..Late::default() }.window_ns(), 250_000_000);
+    /// ```
     pub fn window_ns(&self) -> u64 {
         nanoseconds(self.window_s)
     }
@@ -69,17 +96,17 @@ impl Health {
     }
 
     /// [`degraded_after_s`](Self::degraded_after_s) in nanoseconds of sensor time.
-    pub fn degraded_after_ns(&self) -> u64 {
+    pub(crate) fn degraded_after_ns(&self) -> u64 {
         nanoseconds(self.degraded_after_s)
     }
 
     /// [`stale_after_s`](Self::stale_after_s) in nanoseconds.
-    pub fn stale_after_ns(&self) -> u64 {
+    pub(crate) fn stale_after_ns(&self) -> u64 {
         nanoseconds(self.stale_after_s)
     }
 
     /// [`period_s`](Self::period_s) in nanoseconds.
-    pub fn period_ns(&self) -> u64 {
+    pub(crate) fn period_ns(&self) -> u64 {
         nanoseconds(self.period_s)
     }
 }
@@ -96,7 +123,7 @@ impl Runtime {
     }
 
     /// The upper bound of every wait.
-    pub fn event_timeout(&self) -> Duration {
+    pub(crate) fn event_timeout(&self) -> Duration {
         Duration::from_millis(u64::from(self.event_timeout_ms))
     }
 }

@@ -8,6 +8,14 @@ use super::section::Section;
 pub(super) const NOT_SMOOTHED: &str =
     "estimator = \"smoother\" does not use this, but [smoother] iterations: remove it";
 /// The smoother over the newest fixes.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let smoother = read(format!("estimator = 'smoother'\n{IMU}[smoother]\nwindow = 50\n"))?.smoother;
+/// let smoother = smoother.expect("it is the estimator");
+/// assert_eq!((smoother.window, smoother.prior, smoother.hand_over_deg), (50, Prior::Group, None));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Smoother {
     /// The most states that are smoothed: one for each accepted fix.

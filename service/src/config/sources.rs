@@ -11,6 +11,14 @@ use super::motion::ONLY_ODOMETRY;
 use super::section::Section;
 
 /// A sensor of position fixes, such as a GNSS receiver.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let text = format!("{IMU}[[position_source]]\nid = 1\nlever_arm_m = [0.8, -0.3, 1.2]\n");
+/// let source = &read(text)?.position_sources[0];
+/// assert_eq!((source.id, source.lever_arm_m, source.sigma_scale), (1, [0.8, -0.3, 1.2], 1.0));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionSource {
     /// The id its fixes carry.
@@ -24,6 +32,13 @@ pub struct PositionSource {
 }
 
 /// A sensor of velocity in the world.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let text = format!("{IMU}[[velocity_source]]\nid = 0\nsigma_scale = 2.0\n");
+/// assert_eq!(inertial(text)?.velocity_sources[0].sigma_scale, 2.0);
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct VelocitySource {
     /// The id its fixes carry.
@@ -33,6 +48,13 @@ pub struct VelocitySource {
 }
 
 /// A sensor of heading.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let text = format!("{IMU}[[heading_source]]\nid = 7\n");
+/// assert_eq!(inertial(text)?.heading_sources[0].id, 7);
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeadingSource {
     /// The id its fixes carry.

@@ -11,6 +11,17 @@ use super::operation::nanoseconds;
 use super::section::Section;
 
 /// Two sources of position that are fused together.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let text = format!(
+///     "estimator = 'lc-inekf'\n{ODOMETRY}[[position_source]]\nid = 0\n[[position_source]]\nid = 1\n\
+///      [[mismatched]]\nwhat = 'odometry_scale'\n[stacking]\nsources = [0, 1]\n"
+/// );
+/// let stacking = read(text)?.stacking.expect("it is given");
+/// assert_eq!((stacking.sources, stacking.missing), ([0, 1], MissingPartner::Unconstrained));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stacking {
     /// The ids of the two sources, in the order in which they are stacked.
@@ -59,12 +70,12 @@ impl Stacking {
     }
 
     /// [`tolerance_s`](Self::tolerance_s) in nanoseconds of sensor time.
-    pub fn tolerance_ns(&self) -> u64 {
+    pub(crate) fn tolerance_ns(&self) -> u64 {
         nanoseconds(self.tolerance_s)
     }
 
     /// [`wait_s`](Self::wait_s) in nanoseconds of sensor time.
-    pub fn wait_ns(&self) -> u64 {
+    pub(crate) fn wait_ns(&self) -> u64 {
         nanoseconds(self.wait_s)
     }
 }

@@ -6,6 +6,13 @@ use super::section::Section;
 use super::smoother::NOT_SMOOTHED;
 
 /// The measurement update.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let update = read(format!("{IMU}[update]\ngate_probability = 0.999\n"))?.update;
+/// assert_eq!((update.gate_probability, update.iterations), (Some(0.999), 10));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Update {
     /// Gauss-Newton iterations at most; 1 with [`Transport::None`] is the paper's plain filter.

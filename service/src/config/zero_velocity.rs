@@ -6,6 +6,15 @@ use super::operation::nanoseconds;
 use super::section::Section;
 
 /// Zero-velocity detection. The defaults are those of a car with a MEMS IMU and its engine running.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let found = inertial(format!("{IMU}[zero_velocity]\nafter_s = 5.0\n"))?.zero_velocity;
+/// assert_eq!(found.map(|zero_velocity| zero_velocity.after_s), Some(5.0));
+/// // It is not looked for unless it is asked for.
+/// assert!(inertial(IMU.to_owned())?.zero_velocity.is_none());
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ZeroVelocity {
     /// How long the IMU has to be quiet before the first fix, s.
@@ -61,7 +70,7 @@ impl ZeroVelocity {
     }
 
     /// [`period_s`](Self::period_s) in nanoseconds of sensor time.
-    pub fn period_ns(&self) -> u64 {
+    pub(crate) fn period_ns(&self) -> u64 {
         nanoseconds(self.period_s)
     }
 }

@@ -19,6 +19,23 @@ use crate::engine::{Engine, History, Model, Outbox};
 /// Does what `request` asks, and answers. Whatever its bytes are, a refusal says why.
 ///
 /// Every input that was sent before the request must have been given to `engine` already.
+///
+/// ```
+#[doc = include_str!("../engine/example.txt")]
+/// use inekf_service::daemon::{SmoothedPort, Terms, answer};
+///
+/// # let config = Config::from_toml_str(CONFIG, "example")?;
+/// let terms = Terms { config: &config, config_text: CONFIG, stepped: false, unused_checkpoint: false };
+/// let mut ask = |kind| {
+///     let request = ControlRequest { kind, request_id: 7, ..ControlRequest::ZERO };
+///     answer(&mut engine, &request, &terms, &mut estimates, &mut SmoothedPort::closed())
+/// };
+/// let refused = ask(CONTROL_SNAPSHOT);
+/// assert_eq!((refused.status, refused.request_id), (CONTROL_REFUSED, 7));
+/// assert!(refused.reason().contains("not initialised"));
+/// assert_eq!(ask(CONTROL_PAUSE).state_code, STATE_PAUSED);
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 pub fn answer<M: Model, H: History<M>>(
     engine: &mut Engine<M, H>,
     request: &ControlRequest,
@@ -93,7 +110,7 @@ pub fn answer<M: Model, H: History<M>>(
 ///
 /// # Errors
 /// A sentence that says why it is no entry; the engine has then not taken it.
-pub fn take<M: Model, H: History<M>>(
+pub(super) fn take<M: Model, H: History<M>>(
     engine: &mut Engine<M, H>,
     kind: u32,
     message: &[u8],

@@ -29,6 +29,42 @@ use crate::engine::{self, Engine, History, Model, Use};
 const INSTANCE_MARK: &str = "{instance}";
 
 /// What is to be served.
+///
+/// ```
+/// use std::sync::atomic::AtomicBool;
+///
+/// use inekf_service::config::Config;
+/// use inekf_service::daemon::{Order, serve};
+/// use inekf_shared::topic::Instance;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().expect("a name");
+/// # // SAFETY: this process has no other thread yet.
+/// # unsafe {
+/// #     std::env::set_var("INEKF_IPC_ROOT", root.path());
+/// #     std::env::set_var("INEKF_IPC_PREFIX", prefix);
+/// # }
+/// let config_text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// let config = Config::from_toml_str(config_text, "example")?;
+/// // Set by a signal's handler, or as here before it has begun.
+/// let stop = AtomicBool::new(true);
+/// let order = Order {
+///     config: &config,
+///     config_text,
+///     instances: &[Instance::new("car")?, Instance::new("van")?],
+///     stepped: false,
+///     stop: &stop,
+/// };
+/// // Many vehicles, one configuration.
+/// let mut ready = 0;
+/// serve(&order, || {
+///     ready += 1;
+///     Ok(())
+/// })?;
+/// // Said once, when the ports of all are open.
+/// assert_eq!(ready, 1);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Order<'a> {
     /// The configuration, one for all.
@@ -47,6 +83,40 @@ pub struct Order<'a> {
 ///
 /// # Errors
 /// A port cannot be opened or fails for good, or the configuration cannot be run. One thread's failure ends all.
+///
+/// ```
+/// use std::sync::atomic::AtomicBool;
+///
+/// use inekf_service::config::Config;
+/// use inekf_service::daemon::{Order, serve};
+/// use inekf_shared::topic::Instance;
+///
+/// # let root = tempfile::tempdir_in("/tmp")?;
+/// # let prefix = root.path().file_name().expect("a name");
+/// # // SAFETY: this process has no other thread yet.
+/// # unsafe {
+/// #     std::env::set_var("INEKF_IPC_ROOT", root.path());
+/// #     std::env::set_var("INEKF_IPC_PREFIX", prefix);
+/// # }
+/// let config_text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// let config = Config::from_toml_str(config_text, "example")?;
+/// // Set by a signal's handler, or as here before it has begun.
+/// let stop = AtomicBool::new(true);
+/// let order = Order {
+///     config: &config,
+///     config_text,
+///     instances: &[Instance::new("car")?],
+///     stepped: false,
+///     stop: &stop,
+/// };
+/// let mut is_ready = false;
+/// serve(&order, || {
+///     is_ready = true;
+///     Ok(())
+/// })?;
+/// assert!(is_ready);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 pub fn serve(order: &Order<'_>, ready: impl FnOnce() -> anyhow::Result<()>) -> anyhow::Result<()> {
     let threads = match order.config.runtime.wait {
         WaitMode::Event => order.instances.len(),

@@ -16,6 +16,15 @@ const LEAST_PRIORITY: i32 = 19;
 const PERIOD: Duration = Duration::from_millis(250);
 
 /// Whether somebody has removed files of the ports while they are in use. Ends its thread when dropped.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let ports = transport::inputs(&node, &car)?;
+/// let guard = Guard::of(Watched::of(&node)?);
+/// // Nobody has removed a file of theirs.
+/// assert!(!guard.has_lost());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct Guard {
     watched: Arc<Watched>,
@@ -27,6 +36,13 @@ pub struct Guard {
 
 impl Guard {
     /// Looks after these files from now on. If there can be no thread, nobody does, and the log says so.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let guard = Guard::of(Watched::services_of(&node)?);
+    /// assert!(!guard.has_lost());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn of(watched: Watched) -> Self {
         let watched = Arc::new(watched);
         let looked_after = Arc::clone(&watched);
@@ -62,11 +78,19 @@ impl Guard {
     }
 
     /// Ends it; what it looked after.
-    pub fn end(mut self) -> Arc<Watched> {
+    pub(super) fn end(mut self) -> Arc<Watched> {
         core::mem::take(&mut self.watched)
     }
 
     /// Whether a file has gone. One load.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let guard = Guard::of(Watched::of(&node)?);
+    /// // To be asked by a loop that has no time to look for itself.
+    /// assert!(!guard.has_lost());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn has_lost(&self) -> bool {
         self.gone.load(Ordering::Relaxed)
     }

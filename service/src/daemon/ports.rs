@@ -111,23 +111,34 @@ impl<E: EstimateMessage> Outbox<E> for EstimatePort<E> {
 }
 
 /// All ports of one daemon. They live on the thread that made them.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let ports = Ports::open_on(Rc::clone(&node), &car, &config, false)?;
+/// let vehicle = Vehicle::new(engine, ports, terms, None);
+/// // The ports go with their vehicle: the next one can have them.
+/// drop(vehicle);
+/// # use inekf_service::engine::Inertial;
+/// assert!(Ports::<Inertial<NavState, Left, 15>>::open_on(node, &car, &config, false).is_ok());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Ports<M: Model> {
     /// What comes in.
-    pub inputs: Inputs<M::Sample>,
+    pub(super) inputs: Inputs<M::Sample>,
     /// What goes out.
-    pub estimates: EstimatePort<M::Estimate>,
+    pub(super) estimates: EstimatePort<M::Estimate>,
     /// Smoothed states.
-    pub smoothed: SmoothedPort,
+    pub(super) smoothed: SmoothedPort,
     /// What the engine takes.
-    pub journal: JournalPort,
+    pub(super) journal: JournalPort,
     /// What the engine is to take, in a daemon that is fed entry by entry.
-    pub entries: Option<Subscriber<JournalEntry>>,
+    pub(super) entries: Option<Subscriber<JournalEntry>>,
     /// Health, about once a second.
-    pub health: Publisher<Health>,
+    pub(super) health: Publisher<Health>,
     /// Requests.
-    pub control: ControlServer,
+    pub(super) control: ControlServer,
     /// Woken by feeders in event mode; without a listener their notifications cost nothing.
-    pub wake: Option<WakeListener>,
+    pub(super) wake: Option<WakeListener>,
     // Kept until the ports are gone; the vehicles of a thread share one.
     _node: Rc<Node>,
 }
@@ -139,6 +150,19 @@ impl<M: Model> Ports<M> {
     /// # Errors
     /// [`TransportError`], naming the service and the remedy. If a daemon of this instance is
     /// running, the error names its process id.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// use inekf_service::engine::Inertial;
+    ///
+    /// type OfCar = Ports<Inertial<NavState, Left, 15>>;
+    /// let first = OfCar::open_on(Rc::clone(&node), &car, &config, false)?;
+    /// // A second daemon of the same name would fight with the first about every estimate.
+    /// let second = OfCar::open_on(node, &car, &config, false);
+    /// let process = std::process::id().to_string();
+    /// assert!(second.is_err_and(|reason| reason.to_string().contains(&process)));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn open_on(
         node: Rc<Node>,
         instance: &Instance,

@@ -21,6 +21,18 @@ pub enum Turn {
 }
 
 /// Why a loop ended.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let ports = Ports::open_on(Rc::clone(&node), &car, &config, false)?;
+/// let vehicle = Vehicle::new(engine, ports, terms, None);
+/// let guard = Guard::of(Watched::of(&node)?);
+/// // Set by a signal's handler, or as here before it has begun.
+/// let stop = AtomicBool::new(true);
+/// // With files gone, all ports would have to be opened anew.
+/// assert_ne!(run(&mut [Box::new(vehicle)], &config.runtime, &guard, &stop)?, Ended::FilesGone);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
     /// It was asked to stop.
@@ -83,6 +95,17 @@ pub type StillClosed<'a> = (Box<dyn Closed<'a> + 'a>, anyhow::Error);
 ///
 /// # Errors
 /// A port that fails for good. What a sender wrote is never an error.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let ports = Ports::open_on(Rc::clone(&node), &car, &config, false)?;
+/// let vehicle = Vehicle::new(engine, ports, terms, None);
+/// let guard = Guard::of(Watched::of(&node)?);
+/// // Set by a signal's handler, or as here before it has begun.
+/// let stop = AtomicBool::new(true);
+/// assert_eq!(run(&mut [Box::new(vehicle)], &config.runtime, &guard, &stop)?, Ended::Stopped);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 pub fn run<'a, W: Work<'a> + ?Sized>(
     vehicles: &mut [Box<W>],
     runtime: &Runtime,

@@ -9,11 +9,18 @@ use inekf_shared::transport::{self, Node, Publisher, TransportError};
 use crate::engine::{Engine, History, Model};
 
 /// The topic, if the estimator is a smoother.
+///
+/// ```
+/// use inekf_service::daemon::SmoothedPort;
+///
+/// // Without a topic, as where engines are tested.
+/// assert!(format!("{:?}", SmoothedPort::closed()).contains("None"));
+/// ```
 #[derive(Debug)]
 pub struct SmoothedPort {
     publisher: Option<Publisher<SmoothedState>>,
     /// States that could not be published; the watch reports them.
-    pub failures: u64,
+    pub(super) failures: u64,
 }
 
 impl SmoothedPort {
@@ -21,7 +28,11 @@ impl SmoothedPort {
     ///
     /// # Errors
     /// [`TransportError`], naming the service and the remedy.
-    pub fn open(node: &Node, instance: &Instance, smooths: bool) -> Result<Self, TransportError> {
+    pub(super) fn open(
+        node: &Node,
+        instance: &Instance,
+        smooths: bool,
+    ) -> Result<Self, TransportError> {
         let publisher = match smooths {
             true => Some(transport::smoothed(node, instance)?.publisher()?),
             false => None,
@@ -33,6 +44,19 @@ impl SmoothedPort {
     }
 
     /// A port without a topic, for a daemon that does not smooth: what is published there goes nowhere.
+    ///
+    /// ```
+    #[doc = include_str!("../engine/example.txt")]
+    /// use inekf_service::daemon::{SmoothedPort, Terms, answer};
+    ///
+    /// # let config = Config::from_toml_str(CONFIG, "example")?;
+    /// let terms = Terms { config: &config, config_text: CONFIG, stepped: false, unused_checkpoint: false };
+    /// // An engine answers requests without shared memory, too.
+    /// let request = ControlRequest { kind: CONTROL_SMOOTHED, request_id: 1, ..ControlRequest::ZERO };
+    /// let response = answer(&mut engine, &request, &terms, &mut estimates, &mut SmoothedPort::closed());
+    /// assert!(response.reason().contains("no smoother"));
+    /// # Ok::<(), inekf_service::config::ConfigFaults>(())
+    /// ```
     pub fn closed() -> Self {
         Self {
             publisher: None,
@@ -53,7 +77,7 @@ impl SmoothedPort {
     }
 
     /// Publishes the states that have left the window.
-    pub fn publish_left<M: Model, H: History<M>>(&mut self, engine: &mut Engine<M, H>) {
+    pub(super) fn publish_left<M: Model, H: History<M>>(&mut self, engine: &mut Engine<M, H>) {
         while let Some(state) = engine.take_left() {
             self.publish(state);
         }
@@ -63,7 +87,7 @@ impl SmoothedPort {
     ///
     /// # Errors
     /// A sentence that says why there are none.
-    pub fn answer<M: Model, H: History<M>>(
+    pub(super) fn answer<M: Model, H: History<M>>(
         &mut self,
         engine: &mut Engine<M, H>,
         request_id: u64,

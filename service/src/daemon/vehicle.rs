@@ -34,6 +34,19 @@ use crate::engine::{Engine, History, Model};
 const LOOKS_PER_CHORE: usize = 4;
 
 /// What a vehicle is told once.
+///
+/// ```
+#[doc = include_str!("../engine/example.txt")]
+/// use inekf_service::daemon::{SmoothedPort, Terms, answer};
+///
+/// # let config = Config::from_toml_str(CONFIG, "example")?;
+/// let terms = Terms { config: &config, config_text: CONFIG, stepped: false, unused_checkpoint: false };
+/// // What a client is told that asks for the configuration.
+/// let request = ControlRequest { kind: CONTROL_CONFIG, ..ControlRequest::ZERO };
+/// let response = answer(&mut engine, &request, &terms, &mut estimates, &mut SmoothedPort::closed());
+/// assert!(CONFIG.starts_with(response.reason()) && !response.reason().is_empty());
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Terms<'a> {
     /// The configuration.
@@ -47,6 +60,16 @@ pub struct Terms<'a> {
 }
 
 /// An engine between its ports.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let ports = Ports::open_on(Rc::clone(&node), &car, &config, false)?;
+/// let mut vehicles = [Box::new(Vehicle::new(engine, ports, terms, None))];
+/// // A loop does the rest.
+/// let (guard, stop) = (Guard::of(Watched::of(&node)?), AtomicBool::new(true));
+/// assert_eq!(run(&mut vehicles, &config.runtime, &guard, &stop)?, Ended::Stopped);
+/// # Ok::<(), anyhow::Error>(())
+/// ```
 pub struct Vehicle<'a, M: Model, H> {
     engine: Engine<M, H>,
     ports: Ports<M>,
@@ -132,6 +155,19 @@ const CHORES: [Chore; 6] = [
 
 impl<'a, M: Model, H: History<M>> Vehicle<'a, M, H> {
     /// A vehicle that is ready for its first sample. Checkpoints go to `keeper`.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// use inekf_shared::transport::inspect;
+    ///
+    /// let ports = Ports::open_on(node, &car, &config, false)?;
+    /// let vehicle = Vehicle::new(engine, ports, terms, None);
+    /// assert!(!inspect::shared_memory_files(&memory)?.is_empty());
+    /// // With it goes all that is its own in shared memory, for the node is its own by now.
+    /// drop(vehicle);
+    /// assert!(inspect::shared_memory_files(&memory)?.is_empty());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(
         engine: Engine<M, H>,
         ports: Ports<M>,

@@ -41,6 +41,25 @@ pub trait Use {
     type Output;
 
     /// Does it.
+    ///
+    /// ```
+    /// use inekf_service::config::Config;
+    /// use inekf_service::engine::{Engine, History, Model, Use, build};
+    ///
+    /// struct IsWaiting;
+    ///
+    /// impl Use for IsWaiting {
+    ///     type Output = bool;
+    ///
+    ///     fn with<M: Model, H: History<M>>(self, engine: Engine<M, H>) -> bool {
+    ///         engine.snapshot().is_none()
+    ///     }
+    /// }
+    ///
+    /// let text = "model = 'odometry2d'\n[noise]\nrotation_density = 3e-3\ntranslation_density = 1e-2\n";
+    /// assert!(build(&Config::from_toml_str(text, "example")?, IsWaiting)?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     fn with<M: Model + 'static, H: History<M> + 'static>(
         self,
         engine: Engine<M, H>,
@@ -51,6 +70,27 @@ pub trait Use {
 ///
 /// # Errors
 /// The declared mismatches cannot be constrained with the configured sources; the error says why.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::{Engine, History, Model, Use, build};
+/// use inekf_shared::message::{EstimateMessage, MODEL_ODOMETRY_3D};
+///
+/// /// How a sample reaches the daemon, and an estimate its readers.
+/// struct Code;
+///
+/// impl Use for Code {
+///     type Output = u32;
+///
+///     fn with<M: Model, H: History<M>>(self, _engine: Engine<M, H>) -> u32 {
+///         M::Estimate::MODEL
+///     }
+/// }
+///
+/// let text = "model = 'odometry3d'\n[noise]\nrotation_density = 3e-3\ntranslation_density = 1e-2\n";
+/// assert_eq!(build(&Config::from_toml_str(text, "example")?, Code)?, MODEL_ODOMETRY_3D);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn build<U: Use>(config: &Config, user: U) -> Result<U::Output, UpdateError> {
     let settings = Settings::new(config);
     let inertial = match &config.motion {

@@ -1,27 +1,30 @@
 //! The engine: time, order, losses, the first state and restarts, whatever the model.
 
 use inekf_shared::message::{
-    Header, HeadingFix, INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY, PositionFix, ProcessNoise,
-    REASON_BUFFER_FULL, REASON_INTERNAL, REASON_NOT_READY, REASON_OUT_OF_RANGE, STATE_ALIGNING,
-    STATE_PAUSED, STATE_WAITING, SmoothedState, StateVector, VelocityFix, WAITING_FOR_IMU,
-    WAITING_FOR_LEVEL, WAITING_FOR_NOTHING, WAITING_FOR_POSITION, WAITING_FOR_REQUEST,
+    Header, HeadingFix, INPUT_HEADING, INPUT_POSITION, INPUT_VELOCITY, PositionFix,
+    REASON_INTERNAL, REASON_NOT_READY, STATE_ALIGNING, STATE_PAUSED, STATE_WAITING, SmoothedState,
+    VelocityFix, WAITING_FOR_IMU, WAITING_FOR_LEVEL, WAITING_FOR_NOTHING, WAITING_FOR_POSITION,
+    WAITING_FOR_REQUEST,
 };
 use inekf_shared::transport::InputMessage;
-use nalgebra::{Matrix3, Vector3};
 
-use super::fix::{Antenna, Fix, Measurement};
-use super::history::{Breakdown, History, Insertion};
+use super::fix::{Antenna, Fix};
+use super::history::{Breakdown, History};
 use super::model::{Model, Preceding};
 use super::output::{Outbox, Output};
-use super::resume::{Earlier, ResumeSettings, Resumption};
-use super::settings::{FusionSettings, PositionSource};
-use super::stack::{Missing, Offered, Stack};
+use super::resume::{Earlier, Resumption};
+use super::settings::FusionSettings;
+use super::stack::Stack;
 use super::tally::{Refusal, Tally};
 use super::time_base::{Continuity, TimeBase};
 use super::timeline::Timeline;
 
+mod fixes;
+mod requests;
+mod start;
+
 /// A fix may be this far ahead of the last sample; beyond, its clock is not the samples' clock.
-pub const MAX_AHEAD_NS: u64 = 60_000_000_000;
+pub(crate) const MAX_AHEAD_NS: u64 = 60_000_000_000;
 
 /// Fixes that may come between a requested state and the first sample that it waits for.
 const MAX_EARLY: usize = 64;
@@ -89,7 +92,7 @@ pub struct Engine<M: Model, H = Timeline<M>> {
 
 impl<M: Model> Engine<M> {
     /// A filter that waits for its first samples, with all the memory it will ever use.
-    pub fn of(model: M, fusion: FusionSettings) -> Self {
+    pub(super) fn of(model: M, fusion: FusionSettings) -> Self {
         let timeline = Timeline::new(&model, fusion);
         Self::with_history(model, fusion, timeline)
     }
@@ -97,7 +100,7 @@ impl<M: Model> Engine<M> {
 
 impl<M: Model, H: History<M>> Engine<M, H> {
     /// An engine that waits for its first samples, with all the memory it will ever use; `history` is empty.
-    pub fn with_history(model: M, fusion: FusionSettings, history: H) -> Self {
+    pub(super) fn with_history(model: M, fusion: FusionSettings, history: H) -> Self {
         Self {
             history,
             stack: Stack::new(fusion.stack),
@@ -122,11 +125,28 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     }
 
     /// The counters.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// // Time does not stand still: the second one is refused.
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// let tally = engine.tally();
+    /// assert_eq!((tally.received[INPUT_IMU], tally.counters.rejected), (2, 1));
+    /// assert_eq!(tally.rejected_by_reason[REASON_STAMP_NOT_AFTER as usize], 1);
+    /// ```
     pub fn tally(&self) -> &Tally {
         &self.output.tally
     }
 
     /// `STATE_*` and `WAITING_FOR_*` now.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// assert_eq!(engine.state(), (STATE_WAITING, WAITING_FOR_IMU));
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// assert_eq!(engine.state(), (STATE_RUNNING, WAITING_FOR_NOTHING));
+    /// ```
     pub fn state(&self) -> (u32, u32) {
         if self.paused {
             return (STATE_PAUSED, WAITING_FOR_NOTHING);
@@ -149,52 +169,52 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     }
 
     /// The time of now: stamp of the last accepted sample, or of a state set after it.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// assert_eq!(engine.last_sample_ns(), None);
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// assert_eq!(engine.last_sample_ns(), Some(10_000_000));
+    /// ```
     pub fn last_sample_ns(&self) -> Option<u64> {
         self.time_base.last_ns()
     }
 
     /// How many estimates have been published.
-    pub fn estimates(&self) -> u64 {
+    pub(crate) fn estimates(&self) -> u64 {
         self.output.published()
     }
 
     /// How many messages have fixes that were taken and not judged.
-    pub fn waiting(&self) -> u64 {
+    pub(crate) fn waiting(&self) -> u64 {
         self.history.waiting()
     }
 
     /// What became of the state of an earlier life.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// use inekf_service::engine::resume::Resumption;
+    ///
+    /// // There is none, unless one is given.
+    /// assert_eq!(engine.resumption(), Resumption::None);
+    /// ```
     pub fn resumption(&self) -> Resumption {
         self.resumption
     }
 
-    /// Takes no sample and no fix until [`Engine::unpause`]; they are counted as refused.
-    pub fn pause(&mut self) {
-        self.paused = true;
-    }
-
-    /// Takes samples and fixes again. The time since the last sample is to the estimate what a silence is.
-    pub fn unpause(&mut self) {
-        self.paused = false;
-    }
-
-    /// Uses this process noise from the next sample on.
-    ///
-    /// # Errors
-    /// A sentence that names the fault and the range; the noise is then as it was.
-    pub fn reload_noise(&mut self, noise: &ProcessNoise) -> Result<(), &'static str> {
-        self.model.reload_noise(noise)
-    }
-
-    /// The current state and covariance, if there is one.
-    pub fn snapshot(&self) -> Option<StateVector> {
-        self.history
-            .newest()
-            .map(|(stamp_ns, state)| self.model.snapshot(stamp_ns, state))
-    }
-
     /// Takes a sample that was received at `received_ns` (CLOCK_MONOTONIC, for the latency
     /// stamps only), and publishes what follows from it.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// for step in 1..=100 {
+    ///     engine.sample(&at_rest(10 * step), 0, &mut estimates);
+    /// }
+    /// // The first says where it starts; each other one moves the estimate, and publishes it under its own stamp.
+    /// assert_eq!((estimates.len(), estimates[98].head.stamp_ns), (99, 1_000_000_000));
+    /// assert!(estimates[98].v_w_mps[2].abs() < 1e-9);
+    /// ```
     pub fn sample(
         &mut self,
         sample: &M::Sample,
@@ -271,18 +291,59 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     }
 
     /// Takes a position fix.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// engine.sample(&at_rest(20), 0, &mut estimates);
+    /// engine.position(&east(20, 3.0), &mut estimates);
+    /// // Ten metres were believed of the start, ten centimetres of the fix.
+    /// let corrected = estimates.last().expect("published again");
+    /// assert!((corrected.p_w_m[0] - 3.0).abs() < 0.01);
+    /// assert_eq!((corrected.head.stamp_ns, corrected.head.flags), (20_000_000, ESTIMATE_UPDATED));
+    /// ```
     pub fn position(&mut self, message: &PositionFix, outbox: &mut impl Outbox<M::Estimate>) {
         self.output.tally.receive(INPUT_POSITION, &message.header);
         self.offer(self.model.position(message), outbox);
     }
 
     /// Takes a velocity fix.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// engine.sample(&at_rest(20), 0, &mut estimates);
+    /// let fix = VelocityFix {
+    ///     header: header(20),
+    ///     velocity_w_mps: [5.0, 0.0, 0.0],
+    ///     covariance_w: VARIANCES,
+    ///     ..VelocityFix::ZERO
+    /// };
+    /// engine.velocity(&fix, &mut estimates);
+    /// assert!((estimates.last().expect("published again").v_w_mps[0] - 5.0).abs() < 0.01);
+    /// ```
     pub fn velocity(&mut self, message: &VelocityFix, outbox: &mut impl Outbox<M::Estimate>) {
         self.output.tally.receive(INPUT_VELOCITY, &message.header);
         self.offer(self.model.velocity(message), outbox);
     }
 
     /// Takes a heading fix.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// engine.sample(&at_rest(20), 0, &mut estimates);
+    /// let fix = HeadingFix {
+    ///     header: header(20),
+    ///     heading_rad: 0.5,
+    ///     sigma_rad: 0.01,
+    ///     ..HeadingFix::ZERO
+    /// };
+    /// engine.heading(&fix, &mut estimates);
+    /// // Nothing was known of the heading but this: a turn of 0.5 rad about the vertical.
+    /// let q_wb = estimates.last().expect("published again").q_wb;
+    /// assert!((2.0 * q_wb[2].atan2(q_wb[3]) - 0.5).abs() < 0.01);
+    /// ```
     pub fn heading(&mut self, message: &HeadingFix, outbox: &mut impl Outbox<M::Estimate>) {
         self.output.tally.receive(INPUT_HEADING, &message.header);
         self.offer(self.model.heading(message), outbox);
@@ -290,17 +351,42 @@ impl<M: Model, H: History<M>> Engine<M, H> {
 
     /// Notes that a fix of `input` has come and is kept elsewhere until its time: it is not lost. It is counted as
     /// received when it is handed over.
-    pub fn announce(&mut self, input: usize, header: &Header) {
+    pub(crate) fn announce(&mut self, input: usize, header: &Header) {
         self.output.tally.announce(input, header);
     }
 
     /// Counts a message of another model's topic as refused.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// use inekf_service::engine::tally::Refusal;
+    ///
+    /// // A row of odometry has come to an engine for an IMU.
+    /// engine.refuse(INPUT_ODOMETRY_2D, &header(10), Refusal(REASON_WRONG_MODEL));
+    /// let tally = engine.tally();
+    /// assert_eq!((tally.received[INPUT_ODOMETRY_2D], tally.counters.rejected), (1, 1));
+    /// ```
     pub fn refuse(&mut self, input: usize, header: &Header, refusal: Refusal) {
         self.output.tally.receive(input, header);
         self.output.tally.refuse(refusal);
     }
 
     /// Takes in the fixes that were put off so as not to hold up a sample: call it when no sample waits.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let settings = settings("smoother");
+    /// let smoother = settings.smoother.expect("it is asked for");
+    /// let mut engine = SmoothingEngine::<NavState, 15>::smoothing(settings, &smoother);
+    /// for ms in [10, 20] {
+    ///     engine.sample(&at_rest(ms), 0, &mut estimates);
+    /// }
+    /// // A smoother has more to do for a fix than a sample that comes meanwhile could wait for.
+    /// engine.position(&east(20, 3.0), &mut estimates);
+    /// assert_eq!(engine.tally().counters.accepted, 0);
+    /// engine.settle(&mut estimates);
+    /// assert_eq!(engine.tally().counters.accepted, 1);
+    /// ```
     pub fn settle(&mut self, outbox: &mut impl Outbox<M::Estimate>) {
         let Self {
             model,
@@ -312,6 +398,24 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     }
 
     /// Takes one of the states that have left the window of a smoother, in the order in which they left it.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let settings = settings("smoother");
+    /// let mut smoother = settings.smoother.expect("it is asked for");
+    /// smoother.window.capacity = 2;
+    /// let mut engine = SmoothingEngine::<NavState, 15>::smoothing(settings, &smoother);
+    /// for step in 1..=200 {
+    ///     engine.sample(&at_rest(10 * step), 0, &mut estimates);
+    ///     if step % 20 == 0 {
+    ///         engine.position(&east(10 * step, 0.0), &mut estimates);
+    ///         engine.settle(&mut estimates);
+    ///     }
+    /// }
+    /// // The window holds two, and there have been eleven: the start, and one for each fix.
+    /// let left: Vec<SmoothedState> = std::iter::from_fn(|| engine.take_left()).collect();
+    /// assert!(left.len() >= 8 && left.is_sorted_by_key(|state| state.stamp_ns));
+    /// ```
     pub fn take_left(&mut self) -> Option<SmoothedState> {
         self.history.take_left()
     }
@@ -320,6 +424,25 @@ impl<M: Model, H: History<M>> Engine<M, H> {
     ///
     /// # Errors
     /// A sentence that says why there is none.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let settings = settings("smoother");
+    /// let smoother = settings.smoother.expect("it is asked for");
+    /// let mut smoothing = SmoothingEngine::<NavState, 15>::smoothing(settings, &smoother);
+    /// for step in 1..=60 {
+    ///     smoothing.sample(&at_rest(10 * step), 0, &mut estimates);
+    ///     if step % 20 == 0 {
+    ///         smoothing.position(&east(10 * step, 0.0), &mut estimates);
+    ///         smoothing.settle(&mut estimates);
+    ///     }
+    /// }
+    /// let mut stamps_ns = Vec::new();
+    /// assert!(smoothing.smoothed(&mut |state| stamps_ns.push(state.stamp_ns)).is_ok_and(|count| count >= 3));
+    /// assert!(stamps_ns.is_sorted());
+    /// // A filter has no window.
+    /// assert!(engine.smoothed(&mut |_| {}).is_err_and(|reason| reason.contains("no smoother")));
+    /// ```
     pub fn smoothed(
         &mut self,
         give: &mut dyn FnMut(&SmoothedState),
@@ -335,6 +458,15 @@ impl<M: Model, H: History<M>> Engine<M, H> {
 
     /// Lets go of everything that still waits, because no sample will come any more: fixes without a partner as if
     /// they had waited in vain, all others as not ready. After this every message that was received is accounted for.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// // It lies ahead of the samples, and waits for one that does not come.
+    /// engine.position(&east(500, 3.0), &mut estimates);
+    /// engine.finish(&mut estimates);
+    /// assert_eq!(engine.tally().rejected_by_reason[REASON_NOT_READY as usize], 1);
+    /// ```
     pub fn finish(&mut self, outbox: &mut impl Outbox<M::Estimate>) {
         self.settle(outbox);
         self.unstack(u64::MAX, outbox);
@@ -345,286 +477,6 @@ impl<M: Model, H: History<M>> Engine<M, H> {
             .tally
             .refuse_all(Refusal(REASON_NOT_READY), waiting);
         self.early.clear();
-        self.first_position = None;
-    }
-
-    /// Forgets the state and initialises anew.
-    pub fn reset(&mut self) {
-        self.time_base = TimeBase::new(self.model.restart_gap_ns());
-        self.requested = None;
-        self.give_up_earlier();
-        self.last_input = None;
-        self.missing = 0;
-        self.forget();
-    }
-
-    /// Continues from a state of an earlier life at the first sample, if that is not too late by `settings` and nothing
-    /// else sets the state before. To be called before the first input.
-    ///
-    /// # Errors
-    /// A sentence that names the fault; the estimate then starts as configured.
-    pub fn resume_from(
-        &mut self,
-        state: &StateVector,
-        settings: ResumeSettings,
-    ) -> Result<(), &'static str> {
-        let stamp_ns = state.stamp_ns;
-        let state = self.model.requested(state)?;
-        self.earlier = Some(Earlier {
-            stamp_ns,
-            state,
-            settings,
-        });
-        self.resumption = Resumption::Waiting;
-        Ok(())
-    }
-
-    /// Continues from `state`; a stamp of 0 means the stamp of the last sample, or where the first one
-    /// begins if none has come yet.
-    ///
-    /// # Errors
-    /// A sentence that names the fault and the remedy; the estimate is then unchanged.
-    pub fn set_state(&mut self, state: &StateVector) -> Result<(), &'static str> {
-        let given_ns = (state.stamp_ns != 0).then_some(state.stamp_ns);
-        let last_ns = self.last_sample_ns();
-        if let (Some(given_ns), Some(last_ns)) = (given_ns, last_ns) {
-            if given_ns < last_ns {
-                return Err(
-                    "the state is older than the last sample: send it with a stamp of 0 (now) or \
-                     reset first",
-                );
-            }
-            if given_ns - last_ns > self.model.restart_gap_ns() {
-                return Err("the state lies too far ahead of the last sample: check its clock");
-            }
-        }
-        let requested = self.model.requested(state)?;
-        let Some(stamp_ns) = given_ns.or(last_ns) else {
-            self.give_up_earlier();
-            self.requested = Some(requested);
-            return Ok(());
-        };
-        let input = self
-            .last_input
-            .and_then(|(input_ns, input)| (input_ns == stamp_ns).then_some(input));
-        self.start(stamp_ns, input, requested);
-        Ok(())
-    }
-
-    /// Takes a checked fix, or counts its refusal.
-    fn offer(
-        &mut self,
-        fix: Result<Fix<M::Measurement>, Refusal>,
-        outbox: &mut impl Outbox<M::Estimate>,
-    ) {
-        let fix = match fix {
-            Ok(_) if self.paused => return self.output.tally.refuse(Refusal(REASON_NOT_READY)),
-            Ok(fix) => fix,
-            Err(refusal) => return self.output.tally.refuse(refusal),
-        };
-        if self.history.newest().is_none() {
-            return self.keep_first(fix);
-        }
-        self.take(fix, outbox);
-    }
-
-    /// Hands a fix to the history, once it has its partner.
-    fn take(&mut self, fix: Fix<M::Measurement>, outbox: &mut impl Outbox<M::Estimate>) {
-        let ahead_ns = |now_ns| fix.stamp_ns.saturating_sub(now_ns);
-        if self
-            .last_sample_ns()
-            .is_some_and(|now_ns| ahead_ns(now_ns) > MAX_AHEAD_NS)
-        {
-            return self.output.tally.refuse(Refusal(REASON_OUT_OF_RANGE));
-        }
-        match self.stack.offer(fix) {
-            Offered::Ready(fix) => self.insert(fix, outbox),
-            Offered::Waits => {}
-            Offered::Displaced(oldest) => self.alone(oldest, outbox),
-        }
-    }
-
-    /// Puts the fixes that came before the state on the timeline.
-    fn take_early(&mut self, outbox: &mut impl Outbox<M::Estimate>) {
-        let mut early = core::mem::take(&mut self.early);
-        for fix in early.drain(..) {
-            self.take(fix, outbox);
-        }
-        self.early = early;
-    }
-
-    /// Lets go of the fixes whose partners have not come by `now_ns`.
-    fn unstack(&mut self, now_ns: u64, outbox: &mut impl Outbox<M::Estimate>) {
-        while let Some(fix) = self.stack.overdue(now_ns) {
-            self.alone(fix, outbox);
-        }
-    }
-
-    /// A fix whose partner has not come.
-    fn alone(&mut self, fix: Fix<M::Measurement>, outbox: &mut impl Outbox<M::Estimate>) {
-        self.output.tally.counters.unpaired += 1;
-        match self.stack.missing() {
-            Missing::Unconstrained => self.insert(fix, outbox),
-            Missing::Skip => {}
-        }
-    }
-
-    fn insert(&mut self, fix: Fix<M::Measurement>, outbox: &mut impl Outbox<M::Estimate>) {
-        let Self {
-            model,
-            history,
-            output,
-            ..
-        } = self;
-        let insertion = history.insert(model, fix, |event| output.record(model, &event, outbox));
-        match insertion {
-            Insertion::Waiting | Insertion::Judged => {}
-            Insertion::TooLate => self.output.tally.counters.late += fix.count(),
-            Insertion::Full => {
-                let tally = &mut self.output.tally;
-                tally.refuse_all(Refusal(REASON_BUFFER_FULL), fix.count());
-            }
-        }
-    }
-
-    /// Before there is a state, a position fix is kept to start from, and all are kept for a requested state;
-    /// otherwise they have nothing to correct. A fix that is replaced or unusable is counted as not ready.
-    fn keep_first(&mut self, fix: Fix<M::Measurement>) {
-        let awaited = self.requested.is_some() || self.earlier.is_some();
-        if awaited && self.early.len() < MAX_EARLY {
-            return self.early.push(fix);
-        }
-        let initial = self.model.initial();
-        let usable = initial.needs_fix() && !initial.wait_for_request;
-        match fix.measurement.antenna() {
-            Some(antenna) if usable => {
-                if self
-                    .first_position
-                    .replace((fix.stamp_ns, fix.source, antenna))
-                    .is_some()
-                {
-                    self.output.tally.refuse(Refusal(REASON_NOT_READY));
-                }
-            }
-            _ => self.output.tally.refuse(Refusal(REASON_NOT_READY)),
-        }
-    }
-
-    /// Starts if everything that the first state needs has come. True if there is one.
-    fn try_start(&mut self, stamp_ns: u64, input: &M::Input) -> bool {
-        let without_ns = self.model.start_ns(None, stamp_ns, input);
-        let of_stamp = |start_ns| (start_ns == stamp_ns).then_some(*input);
-        if let Some(state) = self.requested.take() {
-            self.start(without_ns, of_stamp(without_ns), state);
-            return true;
-        }
-        if self.try_resume(without_ns, stamp_ns, input) {
-            return true;
-        }
-        if self.model.initial().wait_for_request {
-            return false;
-        }
-        let Some(r_wb) = self.model.attitude(stamp_ns, input) else {
-            return false;
-        };
-        let mut started_by = None;
-        let (start_ns, antenna) = match self.model.initial().position {
-            PositionSource::Given { position_w, sigma } => (
-                without_ns,
-                Antenna {
-                    position_w,
-                    covariance_w: Matrix3::identity() * (sigma * sigma),
-                    lever_arm_b: Vector3::zeros(),
-                },
-            ),
-            PositionSource::FirstFix => match self.first_position {
-                // A fix ahead of the samples waits for them; an old one is no place to start from.
-                Some((fix_ns, source, antenna)) if fix_ns <= stamp_ns => {
-                    self.first_position = None;
-                    if stamp_ns - fix_ns > self.oldest_start_ns() {
-                        self.output.tally.refuse(Refusal(REASON_NOT_READY));
-                        return false;
-                    }
-                    self.output.tally.counters.accepted += 1;
-                    started_by = Some((source, fix_ns));
-                    (self.model.start_ns(Some(fix_ns), stamp_ns, input), antenna)
-                }
-                _ => return false,
-            },
-        };
-        let alignment = self.model.initial().alignment(r_wb, &antenna);
-        let state = self.model.aligned(&alignment);
-        self.start(start_ns, of_stamp(start_ns), state);
-        if let Some((source, fix_ns)) = started_by {
-            self.output.tally.fused(INPUT_POSITION, source, fix_ns);
-        }
-        true
-    }
-
-    /// Continues from the state of an earlier life, if there is one that can be. Of odometry the first row, which
-    /// begins at `begins_ns`, speaks for a part of the time since.
-    fn try_resume(&mut self, begins_ns: u64, stamp_ns: u64, input: &M::Input) -> bool {
-        let Some(earlier) = self.earlier.take() else {
-            return false;
-        };
-        self.resumption = earlier.judge(stamp_ns);
-        if let Resumption::Resumed { .. } = self.resumption {
-            let start_ns = begins_ns.max(earlier.stamp_ns).min(stamp_ns);
-            let silence_ns = start_ns - earlier.stamp_ns;
-            let mut state = earlier.state;
-            self.model
-                .endure(&mut state, silence_ns, &earlier.settings.doubt);
-            if self.model.is_sound(&state) {
-                self.start(start_ns, (start_ns == stamp_ns).then_some(*input), state);
-                self.output.resumed();
-                return true;
-            }
-            self.resumption = Resumption::Unsound;
-        }
-        // What came for it is now as if there had been none.
-        let mut early = core::mem::take(&mut self.early);
-        for fix in early.drain(..) {
-            self.keep_first(fix);
-        }
-        self.early = early;
-        false
-    }
-
-    /// Something else sets the state.
-    fn give_up_earlier(&mut self) {
-        if self.earlier.take().is_some() {
-            self.resumption = Resumption::None;
-        }
-    }
-
-    /// How old the fix may be that the state starts from: as late as any fix may be, or as long as
-    /// the samples need not be doubted.
-    fn oldest_start_ns(&self) -> u64 {
-        self.model.max_gap_ns().max(self.fusion.late_window_ns)
-    }
-
-    fn start(&mut self, stamp_ns: u64, input: Option<M::Input>, state: M::State) {
-        let early = core::mem::take(&mut self.early);
-        self.forget();
-        self.early = early;
-        self.requested = None;
-        self.give_up_earlier();
-        self.output.started(stamp_ns, &self.model.place_w(&state));
-        self.history.start(&self.model, stamp_ns, input, state);
-        self.time_base.advance_to(stamp_ns);
-    }
-
-    /// Forgets the state. The fixes that still waited for a sample are counted, as every input is.
-    fn forget(&mut self) {
-        let waiting = self.history.waiting()
-            + self.stack.clear() as u64
-            + self.early.len() as u64
-            + u64::from(self.first_position.is_some());
-        let tally = &mut self.output.tally;
-        tally.refuse_all(Refusal(REASON_NOT_READY), waiting);
-        self.history.clear(&self.model);
-        self.early.clear();
-        self.model.forget_attitude();
         self.first_position = None;
     }
 }

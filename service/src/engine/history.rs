@@ -1,6 +1,6 @@
 //! What lies behind the newest estimate: how samples move it on and where fixes are kept until they are due.
 //!
-//! The engine knows time, order, losses and restarts, and asks a [`History`] for everything else.
+//! The engine knows time, order, losses and restarts, and asks a [history](Past) for everything else.
 //! [`super::timeline`] is that of a filter, [`super::smoothing`] that of a smoother.
 
 use core::fmt::Debug;
@@ -65,8 +65,36 @@ pub enum Insertion {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Breakdown;
 
-/// The estimate along time. Nothing here allocates after construction.
-pub trait History<M: Model>: Debug {
+/// The estimate along time: what an engine of the model M keeps of the past, a filter one thing and a smoother another.
+/// This crate's only.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::{Engine, History, Model, Use, build};
+///
+/// /// Whether there is a window of smoothed states.
+/// struct Smooths;
+///
+/// impl Use for Smooths {
+///     type Output = bool;
+///
+///     fn with<M: Model, H: History<M>>(self, mut engine: Engine<M, H>) -> bool {
+///         engine.smoothed(&mut |_| {}).is_err_and(|reason| !reason.contains("no smoother"))
+///     }
+/// }
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// assert!(!build(&Config::from_toml_str(text, "example")?, Smooths)?);
+/// let text = format!("estimator = 'smoother'\n{text}");
+/// assert!(build(&Config::from_toml_str(&text, "example")?, Smooths)?);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub trait History<M: Model>: Past<M> {}
+
+impl<M: Model, P: Past<M>> History<M> for P {}
+
+/// How the past is kept: what only the engine asks of it. Nothing here allocates after construction.
+pub trait Past<M: Model>: Debug {
     /// Forgets everything and starts from `state` at `stamp_ns`; `input` is the sample of that
     /// stamp if there is one.
     fn start(&mut self, model: &M, stamp_ns: u64, input: Option<M::Input>, state: M::State);

@@ -28,15 +28,6 @@ pub const MAX_HEADING_RAD: f64 = 1e4;
 ///
 /// # Errors
 /// One is set.
-///
-/// ```
-/// use inekf_service::engine::intake::no_flags;
-/// use inekf_service::engine::tally::Refusal;
-/// use inekf_shared::message::REASON_BAD_FLAGS;
-///
-/// assert_eq!(no_flags(0), Ok(()));
-/// assert_eq!(no_flags(4), Err(Refusal(REASON_BAD_FLAGS)));
-/// ```
 pub fn no_flags(flags: u32) -> Result<(), Refusal> {
     if flags == 0 {
         Ok(())
@@ -61,13 +52,6 @@ pub fn source(sources: &Sources, kind: FixKind, id: u32) -> Result<SourceSetting
 ///
 /// # Errors
 /// One is not.
-///
-/// ```
-/// use inekf_service::engine::intake::finite;
-///
-/// assert!(finite([1.0, 2.0].iter()).is_ok());
-/// assert!(finite([1.0, f64::NAN].iter()).is_err());
-/// ```
 pub fn finite<'a>(mut values: impl Iterator<Item = &'a f64>) -> Result<(), Refusal> {
     if values.all(|value| value.is_finite()) {
         Ok(())
@@ -80,14 +64,6 @@ pub fn finite<'a>(mut values: impl Iterator<Item = &'a f64>) -> Result<(), Refus
 ///
 /// # Errors
 /// One is not.
-///
-/// ```
-/// use inekf_service::engine::intake::{MAX_VELOCITY_MPS, bounded};
-///
-/// assert!(bounded([300.0, 0.0, -20.0], MAX_VELOCITY_MPS).is_ok());
-/// // Finite, and nothing that a vehicle does.
-/// assert!(bounded([1e7, 0.0, 0.0], MAX_VELOCITY_MPS).is_err());
-/// ```
 pub fn bounded(values: [f64; 3], limit: f64) -> Result<Vector3<f64>, Refusal> {
     finite(values.iter())?;
     let vector = Vector3::from(values);
@@ -115,4 +91,26 @@ pub fn covariance(row_major: &[f64; 9], settings: SourceSettings) -> Result<Matr
         return bad;
     }
     Ok(symmetric)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_number_no_flag_or_beyond_belief_is_refused_by_its_reason() {
+        assert_eq!(no_flags(0), Ok(()));
+        assert_eq!(no_flags(4), Err(Refusal(REASON_BAD_FLAGS)));
+        assert_eq!(finite([1.0, 2.0].iter()), Ok(()));
+        assert_eq!(
+            finite([1.0, f64::NAN].iter()),
+            Err(Refusal(REASON_NOT_FINITE))
+        );
+        assert!(bounded([300.0, 0.0, -20.0], MAX_VELOCITY_MPS).is_ok());
+        // Finite, and nothing that a vehicle does.
+        assert_eq!(
+            bounded([1e7, 0.0, 0.0], MAX_VELOCITY_MPS),
+            Err(Refusal(REASON_OUT_OF_RANGE))
+        );
+    }
 }

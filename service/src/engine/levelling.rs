@@ -9,22 +9,6 @@ use nalgebra::Vector3;
 const CAPACITY: usize = 4096;
 
 /// The most recent readings, over a bounded time.
-///
-/// ```
-/// use inekf::model::ImuInput;
-/// use inekf_service::engine::levelling::Levelling;
-/// use nalgebra::Vector3;
-///
-/// let mut window = Levelling::new(1_000);
-/// let reading = |force_z| ImuInput { omega_b: Vector3::zeros(), force_b: Vector3::new(0.0, 0.0, force_z) };
-/// window.push(0, &reading(50.0));
-/// assert!(!window.is_full());
-/// window.push(1_000, &reading(9.7));
-/// window.push(1_500, &reading(9.9));
-/// // The first has left the window, and counts no more.
-/// assert!(window.is_full());
-/// assert!((window.mean_force().expect("readings").z - 9.8).abs() < 1e-12);
-/// ```
 #[derive(Debug)]
 pub struct Levelling {
     window_ns: u64,
@@ -80,5 +64,25 @@ impl Levelling {
         }
         let sum: Vector3<f64> = self.readings.iter().map(|(_, force)| *force).sum();
         Some(sum / self.readings.len() as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_left_the_window_counts_no_more() {
+        let mut window = Levelling::new(1_000);
+        let reading = |force_z| ImuInput {
+            omega_b: Vector3::zeros(),
+            force_b: Vector3::new(0.0, 0.0, force_z),
+        };
+        window.push(0, &reading(50.0));
+        assert!(!window.is_full());
+        window.push(1_000, &reading(9.7));
+        window.push(1_500, &reading(9.9));
+        assert!(window.is_full());
+        assert!((window.mean_force().unwrap().z - 9.8).abs() < 1e-12);
     }
 }

@@ -1,6 +1,6 @@
 //! What an engine runs: its messages, its motion, its fixes and its filter.
 //!
-//! The engine knows time, order, losses and restarts; a [`Model`] knows what a sample says and what moves. There is one
+//! The engine knows time, order, losses and restarts; a [model](Workings) knows what a sample says and what moves. There is one
 //! for inertial navigation ([`super::inertial`]) and one for odometry ([`super::odometry`]). Nothing in a model
 //! allocates or fails silently: what cannot be used is a [`Refusal`] or an [`UpdateError`].
 
@@ -39,8 +39,32 @@ pub struct Fused {
     pub nis: f64,
 }
 
-/// A way to estimate motion, behind the wire messages.
-pub trait Model: Debug + Sized {
+/// A way to estimate motion, behind the wire messages: `M::Sample` is what moves the state, `M::Estimate` what is
+/// published. This crate's models only: inertial navigation, and odometry in the plane and in space.
+///
+/// ```
+/// use inekf::filter::Left;
+/// use inekf::model::NavState;
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::{Engine, History, InertialEngine, Model, Settings};
+/// use inekf_shared::message::{MODEL_IMU, EstimateMessage};
+///
+/// /// What any engine's estimates are of.
+/// fn code<M: Model, H: History<M>>(_engine: &Engine<M, H>) -> u32 {
+///     M::Estimate::MODEL
+/// }
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// let config = Config::from_toml_str(text, "example")?;
+/// assert_eq!(code(&InertialEngine::<NavState, Left, 15>::new(Settings::new(&config))), MODEL_IMU);
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
+pub trait Model: Workings {}
+
+impl<W: Workings> Model for W {}
+
+/// How a model works: what only the engine asks of it.
+pub trait Workings: Debug + Sized {
     /// The message that moves the state.
     type Sample: InputMessage;
     /// The message that says what is estimated.

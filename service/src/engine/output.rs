@@ -35,6 +35,16 @@ use super::tally::{Refusal, Tally};
 /// ```
 pub trait Outbox<E> {
     /// Takes one estimate, whose `published_ns` it may set. Must neither block nor allocate in the daemon.
+    ///
+    /// ```
+    /// use inekf_service::engine::Outbox;
+    /// use inekf_shared::message::{EstimateSe2, Zero};
+    ///
+    /// // A list keeps them all.
+    /// let mut outbox: Vec<EstimateSe2> = Vec::new();
+    /// outbox.publish(&mut EstimateSe2 { theta_rad: 0.1, ..EstimateSe2::ZERO });
+    /// assert_eq!(outbox[0].theta_rad, 0.1);
+    /// ```
     fn publish(&mut self, estimate: &mut E);
 }
 
@@ -46,7 +56,7 @@ impl<E: Copy> Outbox<E> for Vec<E> {
 
 /// Everything that is said about the estimate beside the estimate itself.
 #[derive(Debug)]
-pub struct Output<E> {
+pub(super) struct Output<E> {
     /// The counters.
     pub tally: Tally,
     /// The message under construction; its head carries what lasts from one to the next.

@@ -15,10 +15,27 @@
 //! that stands still for T.
 //!
 //! What is too old, or ahead of the first sample, is not used: the estimate then starts as configured.
+//!
+//! ```
+//! use inekf_service::config::Checkpoint;
+//! use inekf_service::engine::resume::ResumeSettings;
+//!
+//! // As `[checkpoint]` has it, if it says nothing.
+//! assert!(ResumeSettings::new(&Checkpoint::default()).max_age_ns > 0);
+//! ```
 
 use crate::config::Checkpoint;
 
 /// How much a body may move while nobody hears of it.
+///
+/// ```
+/// use inekf_service::config::Checkpoint;
+/// use inekf_service::engine::resume::{Doubt, ResumeSettings};
+///
+/// // A vehicle that is known to stand while its daemon is updated.
+/// let parked = Doubt { turn_sigma: 0.0, accel_sigma: 0.0, speed_sigma: 0.0 };
+/// assert_ne!(ResumeSettings::new(&Checkpoint::default()).doubt, parked);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Doubt {
     /// Standard deviation of its mean angular rate, each axis, rad/s.
@@ -30,6 +47,16 @@ pub struct Doubt {
 }
 
 /// When an earlier state is continued, and how it is doubted.
+///
+/// ```
+/// use inekf_service::config::Checkpoint;
+/// use inekf_service::engine::resume::ResumeSettings;
+///
+/// let usual = ResumeSettings::new(&Checkpoint::default());
+/// // Whatever its age.
+/// let always = ResumeSettings { max_age_ns: u64::MAX, ..usual };
+/// assert_eq!(always.doubt, usual.doubt);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResumeSettings {
     /// An older state is not continued, nanoseconds of sensor time.
@@ -40,6 +67,14 @@ pub struct ResumeSettings {
 
 impl ResumeSettings {
     /// What a configuration asks for.
+    ///
+    /// ```
+    /// use inekf_service::config::Checkpoint;
+    /// use inekf_service::engine::resume::ResumeSettings;
+    ///
+    /// let checkpoint = Checkpoint { max_age_s: 2.0, ..Checkpoint::default() };
+    /// assert_eq!(ResumeSettings::new(&checkpoint).max_age_ns, 2_000_000_000);
+    /// ```
     pub fn new(checkpoint: &Checkpoint) -> Self {
         Self {
             max_age_ns: checkpoint.max_age_ns(),
@@ -54,16 +89,33 @@ impl ResumeSettings {
 
 /// A state that waits for the first sample.
 #[derive(Clone, Copy, Debug)]
-pub struct Earlier<X> {
+pub(super) struct Earlier<X> {
     /// Time it holds at, nanoseconds of the sensor clock.
-    pub stamp_ns: u64,
+    pub(super) stamp_ns: u64,
     /// The state.
-    pub state: X,
+    pub(super) state: X,
     /// What is done with it.
-    pub settings: ResumeSettings,
+    pub(super) settings: ResumeSettings,
 }
 
 /// What became of an earlier state.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// use inekf_service::config::Checkpoint;
+/// use inekf_service::engine::resume::{ResumeSettings, Resumption};
+///
+/// engine.sample(&at_rest(500), 0, &mut estimates);
+/// let state = engine.snapshot().expect("it has started");
+///
+/// let mut next_life = InertialEngine::<NavState, Left, 15>::new(settings("inekf"));
+/// next_life.resume_from(&state, ResumeSettings::new(&Checkpoint::default()))?;
+/// assert_eq!(next_life.resumption(), Resumption::Waiting);
+/// // The sensor has started anew, and its clock with it.
+/// next_life.sample(&at_rest(10), 0, &mut estimates);
+/// assert_eq!(next_life.resumption(), Resumption::FromFuture { ahead_ns: 490_000_000 });
+/// # Ok::<(), &'static str>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Resumption {
     /// There is none.
@@ -92,7 +144,7 @@ pub enum Resumption {
 
 impl<X> Earlier<X> {
     /// Whether it is used at the first sample, of `stamp_ns`.
-    pub fn judge(&self, stamp_ns: u64) -> Resumption {
+    pub(super) fn judge(&self, stamp_ns: u64) -> Resumption {
         if self.stamp_ns > stamp_ns {
             let ahead_ns = self.stamp_ns - stamp_ns;
             return Resumption::FromFuture { ahead_ns };

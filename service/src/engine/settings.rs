@@ -1,4 +1,14 @@
 //! What the engine needs of the configuration, in SI units and radians.
+//!
+//! ```
+//! use inekf_service::config::Config;
+//! use inekf_service::engine::Settings;
+//!
+//! let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[initial]\nheading_deg = 180.0\n";
+//! let settings = Settings::new(&Config::from_toml_str(text, "example")?);
+//! assert_eq!(settings.initial.heading, std::f64::consts::PI);
+//! # Ok::<(), inekf_service::config::ConfigFaults>(())
+//! ```
 
 use inekf::filter::{Alignment, BiasPrior, Gate, Transport, UpdateOptions};
 use inekf::lie::SO3;
@@ -8,15 +18,28 @@ use inekf_shared::message::MAX_SOURCES;
 use nalgebra::{Matrix3, Vector3};
 
 use super::fix::{Antenna, FixKind};
-use super::inertial::standstill::StandstillSettings;
 use super::resume::Doubt;
-use super::stack::{Missing, StackSettings};
 use crate::config::{
     self, Config, GapPolicy, Hold, Inertial, LateMethod, Level, MissingPartner, Motion,
     Parametrisation, WhiteNoise,
 };
 
+pub use super::inertial::standstill::StandstillSettings;
+pub use super::stack::{Missing, StackSettings};
+
 /// The IMU: what it may say, how its samples are held, its noise.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::Settings;
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[imu]\nmax_gap_s = 0.05\n";
+/// let imu = Settings::new(&Config::from_toml_str(text, "example")?).imu;
+/// assert_eq!((imu.max_gap_ns, imu.g_w.z), (50_000_000, -9.80665));
+/// // After a far longer one nothing is guessed any more.
+/// assert!(imu.restart_gap_ns > imu.max_gap_ns);
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImuSettings {
     /// Gravity, m/s^2, world frame.
@@ -49,12 +72,12 @@ pub struct ImuSettings {
 
 impl InitialSettings {
     /// Whether the start waits for a position fix.
-    pub fn needs_fix(&self) -> bool {
+    pub(super) fn needs_fix(&self) -> bool {
         self.position == PositionSource::FirstFix
     }
 
     /// The parts of the first belief, from an attitude and a position.
-    pub fn alignment(&self, r_wb: SO3, antenna: &Antenna) -> Alignment {
+    pub(super) fn alignment(&self, r_wb: SO3, antenna: &Antenna) -> Alignment {
         Alignment {
             r_wb,
             tilt_sigma: self.level_sigma,
@@ -69,7 +92,7 @@ impl InitialSettings {
     }
 
     /// The same for a pose that is set rather than measured, without a covariance of its own.
-    pub fn alignment_at(&self, r_wb: SO3, position_w: Vector3<f64>) -> Alignment {
+    pub(super) fn alignment_at(&self, r_wb: SO3, position_w: Vector3<f64>) -> Alignment {
         let sigma = match self.position {
             PositionSource::Given { sigma, .. } => sigma,
             PositionSource::FirstFix => UNSTATED_POSITION_SIGMA,
@@ -85,7 +108,7 @@ impl InitialSettings {
 
 impl ImuSettings {
     /// The noise over an interval of `interval_ns`.
-    pub fn noise(&self, interval_ns: u64) -> ImuNoise {
+    pub(super) fn noise(&self, interval_ns: u64) -> ImuNoise {
         if interval_ns > self.max_gap_ns {
             self.noise_with(interval_ns, self.gap_gyro_sigma, self.gap_accel_sigma)
         } else {
@@ -94,7 +117,7 @@ impl ImuSettings {
     }
 
     /// The noise over `silence_ns` in which nothing was heard.
-    pub fn noise_of_silence(&self, silence_ns: u64, doubt: &Doubt) -> ImuNoise {
+    pub(super) fn noise_of_silence(&self, silence_ns: u64, doubt: &Doubt) -> ImuNoise {
         self.noise_with(silence_ns, doubt.turn_sigma, doubt.accel_sigma)
     }
 
@@ -115,6 +138,16 @@ impl ImuSettings {
 }
 
 /// Where the attitude comes from at the start.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::{LevelSource, Settings};
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[initial]\nlevel = 'given'\nroll_deg = 180.0\n";
+/// let initial = Settings::new(&Config::from_toml_str(text, "example")?).initial;
+/// assert_eq!(initial.level, LevelSource::Given { roll: std::f64::consts::PI, pitch: 0.0 });
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LevelSource {
     /// The mean accelerometer reading over this long, nanoseconds.
@@ -132,6 +165,20 @@ pub enum LevelSource {
 }
 
 /// Where the position comes from at the start.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::{PositionSource, Settings};
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// // What is not given comes from the first fix.
+/// let initial = Settings::new(&Config::from_toml_str(text, "example")?).initial;
+/// assert_eq!(initial.position, PositionSource::FirstFix);
+/// let text = format!("{text}[initial]\nposition_m = [1.0, 2.0, 3.0]\n");
+/// let initial = Settings::new(&Config::from_toml_str(&text, "example")?).initial;
+/// assert!(matches!(initial.position, PositionSource::Given { sigma, .. } if sigma == 10.0));
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PositionSource {
     /// The first fix, with its covariance and lever arm.
@@ -146,6 +193,16 @@ pub enum PositionSource {
 }
 
 /// The first belief.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::Settings;
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[initial]\nvelocity_mps = [5.0, 0.0, 0.0]\n";
+/// let initial = Settings::new(&Config::from_toml_str(text, "example")?).initial;
+/// assert_eq!((initial.velocity_w.x, initial.wait_for_request), (5.0, false));
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InitialSettings {
     /// Heading, rad, counter-clockwise from east.
@@ -169,6 +226,19 @@ pub struct InitialSettings {
 }
 
 /// One aiding source.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::Settings;
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[[position_source]]\nid = 2\nlever_arm_m = [0.5, 0.0, 1.2]\n";
+/// let fusion = Settings::new(&Config::from_toml_str(text, "example")?).fusion;
+/// // Positions come first, each at the place of its id.
+/// let antenna = fusion.sources[0][2].expect("it is configured");
+/// assert_eq!((antenna.lever_arm_b.z, antenna.sigma_scale), (1.2, 1.0));
+/// assert!(fusion.sources[0][1].is_none());
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SourceSettings {
     /// From the IMU to the antenna, m, body frame.
@@ -183,6 +253,17 @@ pub struct SourceSettings {
 pub type Sources = [[Option<SourceSettings>; MAX_SOURCES]; FixKind::COUNT];
 
 /// How fixes are fused.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::Settings;
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[late]\nwindow_s = 0.5\n";
+/// let fusion = Settings::new(&Config::from_toml_str(text, "example")?).fusion;
+/// assert_eq!(fusion.late_window_ns, 500_000_000);
+/// assert!(fusion.stack.is_none());
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FusionSettings {
     /// Iterations, transport and gate.
@@ -205,7 +286,7 @@ pub struct FusionSettings {
 
 impl FusionSettings {
     /// How a measurement is fused, gated or not.
-    pub fn options(&self, gated: bool) -> UpdateOptions {
+    pub(super) fn options(&self, gated: bool) -> UpdateOptions {
         if gated {
             return self.update;
         }
@@ -217,6 +298,16 @@ impl FusionSettings {
 }
 
 /// The smoother.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::Settings;
+///
+/// let text = "estimator = 'smoother'\nmodel = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[smoother]\nwindow = 7\n";
+/// let settings = Settings::new(&Config::from_toml_str(text, "example")?);
+/// assert_eq!(settings.smoother.map(|smoother| smoother.window.capacity), Some(7));
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmootherSettings {
     /// How a correction is attached to a state.
@@ -228,6 +319,24 @@ pub struct SmootherSettings {
 }
 
 /// Everything.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::Settings;
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// let settings = Settings::new(&Config::from_toml_str(text, "example")?);
+/// // Plain data, to be changed where an engine is built without a file.
+/// let patient = Settings {
+///     initial: inekf_service::engine::settings::InitialSettings {
+///         wait_for_request: true,
+///         ..settings.initial
+///     },
+///     ..settings
+/// };
+/// assert_ne!(patient, settings);
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// The IMU.
@@ -254,6 +363,16 @@ const ITERATION_TOLERANCE: f64 = 1e-6;
 
 impl Settings {
     /// The settings that `config` asks for.
+    ///
+    /// ```
+    /// use inekf_service::config::Config;
+    /// use inekf_service::engine::settings::Settings;
+    ///
+    /// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+    /// let settings = Settings::new(&Config::from_toml_str(text, "example")?);
+    /// assert!(settings.smoother.is_none() && settings.imu.standstill.is_none());
+    /// # Ok::<(), inekf_service::config::ConfigFaults>(())
+    /// ```
     pub fn new(config: &Config) -> Self {
         Self {
             imu: match &config.motion {
@@ -426,6 +545,6 @@ fn fusion(config: &Config) -> FusionSettings {
 }
 
 /// Nanoseconds as seconds.
-pub fn seconds(ns: u64) -> f64 {
+pub(super) fn seconds(ns: u64) -> f64 {
     ns as f64 * 1e-9
 }

@@ -11,6 +11,32 @@ use super::fix::{Fix, FixKind, Measurement};
 const CAPACITY: usize = 32;
 
 /// What happens to a fix without its partner.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::{Missing, Settings};
+///
+/// let text = "\
+/// model = 'odometry2d'
+/// estimator = 'lc-inekf'
+/// [noise]
+/// rotation_density = 3e-3
+/// translation_density = 1e-2
+/// [[position_source]]
+/// id = 0
+/// [[position_source]]
+/// id = 1
+/// [[mismatched]]
+/// what = 'odometry_scale'
+/// [stacking]
+/// sources = [0, 1]
+/// tolerance_s = 0.01
+/// missing = 'skip'
+/// ";
+/// let stack = Settings::new(&Config::from_toml_str(text, "example")?).fusion.stack;
+/// assert_eq!(stack.map(|stack| stack.missing), Some(Missing::Skip));
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {
     /// It is used alone, without constraints.
@@ -20,6 +46,32 @@ pub enum Missing {
 }
 
 /// Which sources belong together.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::Settings;
+///
+/// let text = "\
+/// model = 'odometry2d'
+/// estimator = 'lc-inekf'
+/// [noise]
+/// rotation_density = 3e-3
+/// translation_density = 1e-2
+/// [[position_source]]
+/// id = 0
+/// [[position_source]]
+/// id = 1
+/// [[mismatched]]
+/// what = 'odometry_scale'
+/// [stacking]
+/// sources = [0, 1]
+/// tolerance_s = 0.01
+/// missing = 'skip'
+/// ";
+/// let stack = Settings::new(&Config::from_toml_str(text, "example")?).fusion.stack;
+/// assert_eq!(stack.map(|stack| (stack.sources, stack.tolerance_ns)), Some(([0, 1], 10_000_000)));
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StackSettings {
     /// The two position sources.

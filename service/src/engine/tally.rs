@@ -1,16 +1,30 @@
 //! What became of every input: nothing is refused or missed without being counted.
+//!
+//! ```
+//! use inekf_service::engine::tally::Tally;
+//!
+//! assert_eq!(Tally::default().counters.rejected, 0);
+//! ```
 
 use inekf_shared::message::{Counters, Header, INPUTS, REASONS, SOURCES, source_index};
 
 /// Why an input was refused; the code is that of `inekf_shared::message::REASON_*`.
 ///
 /// ```
-/// use inekf_service::engine::tally::{Refusal, Tally};
-/// use inekf_shared::message::REASON_NOT_FINITE;
+/// use inekf::filter::Left;
+/// use inekf::model::NavState;
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::tally::Refusal;
+/// use inekf_service::engine::{InertialEngine, Settings};
+/// use inekf_shared::message::{Header, INPUT_ODOMETRY_2D, REASON_WRONG_MODEL, Zero};
 ///
-/// let mut tally = Tally::default();
-/// tally.refuse(Refusal(REASON_NOT_FINITE));
-/// assert_eq!((tally.counters.rejected, tally.rejected_by_reason[REASON_NOT_FINITE as usize]), (1, 1));
+/// # let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// # let config = Config::from_toml_str(text, "example")?;
+/// let mut engine = InertialEngine::<NavState, Left, 15>::new(Settings::new(&config));
+/// // A row of odometry has come, and this is an engine for an IMU.
+/// engine.refuse(INPUT_ODOMETRY_2D, &Header::ZERO, Refusal(REASON_WRONG_MODEL));
+/// assert_eq!(engine.tally().rejected_by_reason[REASON_WRONG_MODEL as usize], 1);
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Refusal(pub u32);
@@ -28,38 +42,36 @@ struct Numbering {
 }
 
 /// What a message's number says.
-///
-/// ```
-/// use inekf_service::engine::tally::{Heard, Tally};
-/// use inekf_shared::message::{Header, INPUT_IMU, Zero};
-///
-/// let mut tally = Tally::default();
-/// let mut receive = |seq| tally.receive(INPUT_IMU, &Header { seq, epoch: 1, ..Header::ZERO });
-/// receive(0);
-/// // Two are missing before the fourth; one that was heard comes once more.
-/// assert_eq!(receive(3), Heard { lost: 2, repeated: false });
-/// assert_eq!(receive(3), Heard { lost: 0, repeated: true });
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Heard {
+pub(super) struct Heard {
     /// Messages of its sender missing before it.
-    pub lost: u64,
+    pub(super) lost: u64,
     /// Whether this number was heard, or counted as lost, before.
-    pub repeated: bool,
+    pub(super) repeated: bool,
 }
 
 /// All counters of the engine.
 ///
 /// ```
-/// use inekf_service::engine::tally::Tally;
-/// use inekf_shared::message::{Header, INPUT_IMU, Zero};
+/// use inekf::filter::Left;
+/// use inekf::model::NavState;
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::{InertialEngine, Settings};
+/// use inekf_shared::message::{INPUT_IMU, ImuSample, Zero};
 ///
-/// let mut tally = Tally::default();
+/// # let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n";
+/// # let config = Config::from_toml_str(text, "example")?;
+/// let mut engine = InertialEngine::<NavState, Left, 15>::new(Settings::new(&config));
+/// let mut estimates = Vec::new();
 /// for (epoch, seq) in [(1, 0), (1, 1), (2, 0), (2, 5)] {
-///     tally.receive(INPUT_IMU, &Header { seq, epoch, ..Header::ZERO });
+///     let mut sample = ImuSample { accel_mps2: [0.0, 0.0, 9.80665], ..ImuSample::ZERO };
+///     (sample.header.epoch, sample.header.seq) = (epoch, seq);
+///     engine.sample(&sample, 0, &mut estimates);
 /// }
 /// // A sender that has started anew counts anew.
+/// let tally = engine.tally();
 /// assert_eq!((tally.received[INPUT_IMU], tally.counters.lost), (4, 4));
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
@@ -81,13 +93,13 @@ pub struct Tally {
 impl Tally {
     /// Counts a message of `input` (an `INPUT_*` index) and those missing before it, and says what its number tells.
     /// Each epoch is a sender with a numbering of its own, so several may share a topic.
-    pub fn receive(&mut self, input: usize, header: &Header) -> Heard {
+    pub(super) fn receive(&mut self, input: usize, header: &Header) -> Heard {
         self.received[input] += 1;
         self.announce(input, header)
     }
 
     /// The same for a message that has come, but is not to be counted as received yet.
-    pub fn announce(&mut self, input: usize, header: &Header) -> Heard {
+    pub(super) fn announce(&mut self, input: usize, header: &Header) -> Heard {
         self.announced += 1;
         let heard = self.announced;
         let senders = &mut self.numbering[input];
@@ -119,18 +131,7 @@ impl Tally {
     }
 
     /// Notes that a fix of this time, topic and source was fused.
-    ///
-    /// ```
-    /// use inekf_service::engine::tally::Tally;
-    /// use inekf_shared::message::INPUT_POSITION;
-    ///
-    /// let mut tally = Tally::default();
-    /// tally.fused(INPUT_POSITION, 0, 500);
-    /// // A late one is fused too, and is not the newest.
-    /// tally.fused(INPUT_POSITION, 0, 300);
-    /// assert_eq!(tally.last_fix_stamp_ns, 500);
-    /// ```
-    pub fn fused(&mut self, input: usize, source: u32, stamp_ns: u64) {
+    pub(super) fn fused(&mut self, input: usize, source: u32, stamp_ns: u64) {
         self.last_fix_stamp_ns = self.last_fix_stamp_ns.max(stamp_ns);
         if let Some(newest) =
             source_index(input, source).and_then(|at| self.fused_stamp_ns.get_mut(at))
@@ -140,18 +141,18 @@ impl Tally {
     }
 
     /// Forgets which fixes were fused: the state has been set anew, and there may be another clock.
-    pub fn forget_fused(&mut self) {
+    pub(super) fn forget_fused(&mut self) {
         self.last_fix_stamp_ns = 0;
         self.fused_stamp_ns = [0; SOURCES];
     }
 
     /// Counts a refusal.
-    pub fn refuse(&mut self, refusal: Refusal) {
+    pub(super) fn refuse(&mut self, refusal: Refusal) {
         self.refuse_all(refusal, 1);
     }
 
     /// Counts the refusal of so many messages.
-    pub fn refuse_all(&mut self, refusal: Refusal, messages: u64) {
+    pub(super) fn refuse_all(&mut self, refusal: Refusal, messages: u64) {
         self.counters.rejected += messages;
         if let Some(count) = self.rejected_by_reason.get_mut(refusal.0 as usize) {
             *count += messages;
@@ -189,5 +190,27 @@ mod tests {
         }
         assert_eq!(tally.received[INPUT_POSITION], 5);
         assert_eq!(tally.counters.lost, 2);
+    }
+
+    #[test]
+    fn a_late_fix_is_counted_and_is_not_the_newest() {
+        let mut tally = Tally::default();
+        tally.fused(INPUT_POSITION, 0, 500);
+        tally.fused(INPUT_POSITION, 0, 300);
+        assert_eq!(tally.last_fix_stamp_ns, 500);
+        tally.forget_fused();
+        assert_eq!(tally.last_fix_stamp_ns, 0);
+    }
+
+    #[test]
+    fn a_refusal_is_counted_by_its_reason() {
+        let mut tally = Tally::default();
+        tally.refuse_all(Refusal(3), 2);
+        // A reason that does not exist is a refusal all the same.
+        tally.refuse(Refusal(u32::MAX));
+        assert_eq!(
+            (tally.counters.rejected, tally.rejected_by_reason[3]),
+            (3, 2)
+        );
     }
 }

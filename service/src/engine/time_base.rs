@@ -11,12 +11,6 @@ use super::tally::Refusal;
 const CONFIRMATIONS: u32 = 10;
 
 /// What to do with a sample.
-///
-/// ```
-/// use inekf_service::engine::time_base::Continuity;
-///
-/// assert_ne!(Continuity::Next, Continuity::Restart);
-/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Continuity {
     /// It follows the last one.
@@ -26,22 +20,6 @@ pub enum Continuity {
 }
 
 /// The time of the accepted samples, and a jump that is not believed yet.
-///
-/// ```
-/// use inekf_service::engine::time_base::{Continuity, TimeBase};
-/// use inekf_shared::message::{Header, Zero};
-///
-/// let mut time = TimeBase::new(1_000);
-/// let at = |stamp_ns| Header { stamp_ns, ..Header::ZERO };
-/// assert_eq!(time.judge(&at(500)), Ok(Continuity::Next));
-/// // One wrong stamp does not move the clock ..
-/// assert!(time.judge(&at(900_000)).is_err());
-/// assert_eq!(time.judge(&at(600)), Ok(Continuity::Next));
-/// // .. and one that really jumped is believed, once ten in a row agree.
-/// let judged: Vec<_> = (0..10).map(|i| time.judge(&at(900_000 + 100 * i))).collect();
-/// assert!(judged[..9].iter().all(Result::is_err));
-/// assert_eq!(judged[9], Ok(Continuity::Restart));
-/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct TimeBase {
     restart_gap_ns: u64,
@@ -121,5 +99,29 @@ impl TimeBase {
         } else {
             REASON_GAP
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use inekf_shared::message::Zero;
+
+    use super::*;
+
+    #[test]
+    fn one_wrong_stamp_does_not_move_the_clock_and_ten_that_agree_do() {
+        let mut time = TimeBase::new(1_000);
+        let at = |stamp_ns| Header {
+            stamp_ns,
+            ..Header::ZERO
+        };
+        assert_eq!(time.judge(&at(500)), Ok(Continuity::Next));
+        assert_eq!(time.judge(&at(900_000)), Err(Refusal(REASON_GAP)));
+        assert_eq!(time.judge(&at(600)), Ok(Continuity::Next));
+        let judged: Vec<_> = (0..10)
+            .map(|i| time.judge(&at(900_000 + 100 * i)))
+            .collect();
+        assert!(judged[..9].iter().all(Result::is_err));
+        assert_eq!(judged[9], Ok(Continuity::Restart));
     }
 }

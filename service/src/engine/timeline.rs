@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use inekf::filter::UpdateError;
 
 use super::fix::Fix;
-use super::history::{Breakdown, Event, History, Insertion, MAX_FIXES};
+use super::history::{Breakdown, Event, Insertion, MAX_FIXES, Past};
 use super::model::{Fused, Model};
 use super::recovery::{Lockout, Widening};
 use super::settings::FusionSettings;
@@ -200,7 +200,7 @@ impl<M: Model> Timeline<M> {
     }
 }
 
-impl<M: Model> History<M> for Timeline<M> {
+impl<M: Model> Past<M> for Timeline<M> {
     fn start(&mut self, model: &M, stamp_ns: u64, input: Option<M::Input>, state: M::State) {
         self.clear(model);
         self.knots.push_back(Knot {

@@ -551,7 +551,7 @@ fn other_ways_to_write_the_same_are_accepted() {
             accel: 2.0
         }
     );
-    assert_eq!(config.initial.heading_rad(), -std::f64::consts::FRAC_PI_2);
+    assert_eq!(config.initial.heading_deg, -90.0);
     assert_eq!(config.initial.position_m, Some([1.0, 2.5, 3.0]));
     assert_eq!(config.update.iterations, 10);
     let Motion::Inertial(inertial) = &config.motion else {
@@ -577,21 +577,6 @@ fn other_ways_to_write_the_same_are_accepted() {
         2_000_000_000
     );
     assert!(Config::from_toml_str(&format!("\u{feff}{}", text("", "")), "byte order mark").is_ok());
-}
-
-#[test]
-fn densities_become_sigmas_by_the_root_of_the_interval() {
-    let (gyro, accel) = WhiteNoise::Density {
-        gyro: 3.0,
-        accel: 5.0,
-    }
-    .sample_sigmas(0.25);
-    assert_eq!((gyro, accel), (6.0, 10.0));
-    let per_sample = WhiteNoise::PerSample {
-        gyro: 3.0,
-        accel: 5.0,
-    };
-    assert_eq!(per_sample.sample_sigmas(0.25), (3.0, 5.0));
 }
 
 #[test]

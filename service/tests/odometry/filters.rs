@@ -9,16 +9,16 @@ use inekf::filter::{
 use inekf::lie::{SE2, SE3, SO2, SO3};
 use inekf::model::{
     Augmented, Declared, OdometryStep, OutputMismatch, PointFix, Points, ProcessColumns,
-    ProcessMismatch, Unknowns,
+    ProcessMismatch, RigidPose, Unknowns,
 };
-use inekf_service::engine::odometry::vehicle::Vehicle;
 use inekf_shared::message::StateVector;
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, SVector, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::harness::{
-    CHOICES, Input, PERIOD, SIGMAS, START, fix, planar_state, plane, run, space, spatial_state,
+    CHOICES, Input, PERIOD, PLANAR_HEADING, SIGMAS, START, fix, planar_state, plane, run, space,
+    spatial_state,
 };
 
 /// What happens along a drive, as the library has it.
@@ -53,7 +53,7 @@ pub struct Single<G, S, const D: usize> {
 impl<G, S, const D: usize, const N: usize, const PAIR: usize> Oracle<G, D, N, PAIR>
     for Single<G, S, D>
 where
-    G: Vehicle<D, N>,
+    G: RigidPose<D, N>,
     S: Side,
 {
     fn step(&mut self, step: &OdometryStep<G>, q: &SMatrix<f64, D, D>) {
@@ -98,7 +98,7 @@ fn corner<G: Copy, const D: usize, const A: usize>(
 impl<G, const D: usize, const A: usize, const N: usize, const PAIR: usize> Oracle<G, D, N, PAIR>
     for Learning<G, D, A>
 where
-    G: Vehicle<D, N>,
+    G: RigidPose<D, N>,
 {
     fn step(&mut self, step: &OdometryStep<G>, q: &SMatrix<f64, D, D>) {
         let noise = SMatrix::from_fn(|i, j| if i < D && j < D { q[(i, j)] } else { 0.0 });
@@ -130,7 +130,7 @@ struct Bank<G, const D: usize, const A: usize> {
 impl<G, const D: usize, const A: usize, const N: usize, const PAIR: usize> Oracle<G, D, N, PAIR>
     for Bank<G, D, A>
 where
-    G: Vehicle<D, N>,
+    G: RigidPose<D, N>,
 {
     fn step(&mut self, step: &OdometryStep<G>, q: &SMatrix<f64, D, D>) {
         self.bank.advance(&self.unknowns, step, q);
@@ -177,7 +177,7 @@ fn oracle<G, const D: usize, const N: usize, const PAIR: usize, const A: usize>(
     prior: Belief<G, Left, D>,
 ) -> Box<dyn Oracle<G, D, N, PAIR>>
 where
-    G: Vehicle<D, N> + 'static,
+    G: RigidPose<D, N> + 'static,
 {
     fn single<G, S, const D: usize, const N: usize, const PAIR: usize>(
         prior: Belief<G, Left, D>,
@@ -185,7 +185,7 @@ where
         sigmas: [f64; 3],
     ) -> Box<dyn Oracle<G, D, N, PAIR>>
     where
-        G: Vehicle<D, N> + 'static,
+        G: RigidPose<D, N> + 'static,
         S: Side + 'static,
     {
         Box::new(Single::<G, S, D> {
@@ -248,15 +248,16 @@ const BURST: f64 = 3.0;
 /// The drive: inputs for the engine and what the library does with them.
 fn drive<G, const D: usize, const N: usize>(
     state: &StateVector,
+    start: G,
     row: impl Fn(u64, u64, SVector<f64, D>) -> Input,
 ) -> (Vec<Input>, Vec<Op<G, D, N>>)
 where
-    G: Vehicle<D, N>,
+    G: RigidPose<D, N>,
 {
     let mut random = ChaCha8Rng::seed_from_u64(20);
     let mut spread = |size: f64| size * (2.0 * random.random::<f64>() - 1.0);
     let (mut inputs, mut ops) = (vec![Input::Set(*state)], Vec::new());
-    let mut truth = G::of_state(&SO3::from_quaternion_xyzw(state.q_wb).unwrap(), state).unwrap();
+    let mut truth = start;
     let noise = |dt_s: f64| {
         SMatrix::from_diagonal(&SVector::from_fn(|i, _| {
             let density: f64 = if i < G::ROTATION_DIM { 0.01 } else { 0.02 };
@@ -319,13 +320,13 @@ where
 /// Runs the drive through the engine and through the library, and compares the last estimates.
 fn compare<G, const D: usize, const N: usize, const PAIR: usize, const A: usize>(
     state: StateVector,
+    mean: G,
     row: impl Fn(u64, u64, SVector<f64, D>) -> Input,
     numbers: impl Fn(&G) -> Vec<f64>,
 ) where
-    G: Vehicle<D, N> + 'static,
+    G: RigidPose<D, N> + 'static,
 {
-    let (inputs, ops) = drive::<G, D, N>(&state, row);
-    let mean = G::of_state(&SO3::from_quaternion_xyzw(state.q_wb).unwrap(), &state).unwrap();
+    let (inputs, ops) = drive::<G, D, N>(&state, mean, row);
     let triangle = &state.covariance[..D * (D + 1) / 2];
     let prior = Belief::new(mean, Covariance::from_upper_triangle(triangle).unwrap());
     for choice in CHOICES {
@@ -357,8 +358,14 @@ fn compare<G, const D: usize, const N: usize, const PAIR: usize, const A: usize>
 
 #[test]
 fn every_filter_in_the_plane_is_the_library_called_directly() {
+    let state = planar_state(START, [0.02, 1.0, 2.0]);
+    let start = SE2 {
+        rotation: SO2::from_angle(PLANAR_HEADING),
+        position: Vector2::new(state.p_w_m[0], state.p_w_m[1]),
+    };
     compare::<SE2, 3, 2, 4, 6>(
-        planar_state(START, [0.02, 1.0, 2.0]),
+        state,
+        start,
         |stamp, seq, u| plane(stamp, seq, u.into()),
         |chi| {
             let angle = SO2::angle_rad(&chi.rotation);
@@ -369,8 +376,14 @@ fn every_filter_in_the_plane_is_the_library_called_directly() {
 
 #[test]
 fn every_filter_in_space_is_the_library_called_directly() {
+    let state = spatial_state(START, [0.01, 0.01, 0.02, 1.0, 2.0, 1.5]);
+    let start = SE3 {
+        rotation: SO3::from_quaternion_xyzw(state.q_wb).unwrap(),
+        position: state.p_w_m.into(),
+    };
     compare::<SE3, 6, 3, 6, 9>(
-        spatial_state(START, [0.01, 0.01, 0.02, 1.0, 2.0, 1.5]),
+        state,
+        start,
         |stamp, seq, u| space(stamp, seq, u.into()),
         |chi| {
             let quaternion = chi.rotation.quaternion_xyzw();

@@ -370,13 +370,21 @@ pub fn fix(stamp_ns: u64, seq: u64, source: u32, at: &[f64]) -> Input {
     })
 }
 
-/// A state in the plane at the origin's side, heading 0.3 rad, with these variances.
+/// Heading of [`planar_state`], rad.
+pub const PLANAR_HEADING: f64 = 0.3;
+
+/// A state in the plane at the origin's side, with these variances.
 pub fn planar_state(stamp_ns: u64, variances: [f64; 3]) -> StateVector {
     let mut state = StateVector {
         model: MODEL_ODOMETRY_2D,
         dimension: 3,
         stamp_ns,
-        q_wb: [0.0, 0.0, 0.15f64.sin(), 0.15f64.cos()],
+        q_wb: [
+            0.0,
+            0.0,
+            (PLANAR_HEADING / 2.0).sin(),
+            (PLANAR_HEADING / 2.0).cos(),
+        ],
         p_w_m: [4.0, -3.0, 0.0],
         ..StateVector::ZERO
     };

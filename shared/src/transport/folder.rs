@@ -9,6 +9,17 @@ use std::time::{Duration, SystemTime};
 const SETTLED_AFTER: Duration = Duration::from_millis(100);
 
 /// A folder that is looked at again and again.
+///
+/// ```
+/// use inekf_shared::transport::Folder;
+///
+/// let place = tempfile::tempdir()?;
+/// let mut folder = Folder::new(place.path().to_path_buf());
+/// assert!(folder.has_changed(), "so far nothing was known of it");
+/// std::fs::write(place.path().join("new"), "")?;
+/// assert!(folder.has_changed());
+/// # Ok::<(), std::io::Error>(())
+/// ```
 #[derive(Debug)]
 pub struct Folder {
     path: PathBuf,
@@ -32,6 +43,19 @@ impl Folder {
     }
 
     /// Whether its entries may have changed since the last call. What is in its files does not count.
+    ///
+    /// ```
+    /// use inekf_shared::transport::Folder;
+    ///
+    /// let place = tempfile::tempdir()?;
+    /// // A folder whose last change is long past.
+    /// std::fs::File::open(place.path())?.set_modified(std::time::UNIX_EPOCH)?;
+    /// let mut folder = Folder::new(place.path().to_path_buf());
+    /// assert!(folder.has_changed() && !folder.has_changed());
+    /// std::fs::write(place.path().join("new"), "")?;
+    /// assert!(folder.has_changed());
+    /// # Ok::<(), std::io::Error>(())
+    /// ```
     pub fn has_changed(&mut self) -> bool {
         let now = SystemTime::now();
         let changed = fs::metadata(&self.path).and_then(|metadata| metadata.modified());

@@ -3,9 +3,7 @@
 //! The first byte chooses the configuration; requests follow one after the other.
 
 use inekf_service::config::Config;
-use inekf_service::daemon::Terms;
-use inekf_service::daemon::control::answer;
-use inekf_service::daemon::smoothed::SmoothedPort;
+use inekf_service::daemon::{SmoothedPort, Terms, answer};
 use inekf_service::engine::{Engine, History, Model, Use, build};
 use inekf_shared::message::{
     CONTROL_BARRIER, CONTROL_CONFIG, CONTROL_OK, CONTROL_PAUSE, CONTROL_REFUSED,

@@ -5,9 +5,7 @@ use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use inekf_service::config::Config;
-use inekf_service::daemon::guard::Guard;
-use inekf_service::daemon::run::run;
-use inekf_service::daemon::{Ports, Terms, Vehicle};
+use inekf_service::daemon::{Guard, Ports, Terms, Vehicle, run};
 use inekf_service::engine::{self, Engine, History, Model, Use};
 use inekf_shared::message::{EstimateSe23, Zero};
 use inekf_shared::transport::{self, Watched};

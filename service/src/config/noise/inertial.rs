@@ -8,6 +8,13 @@ use super::super::section::Section;
 use super::{Form, Relevance, form_of};
 
 /// Process noise of inertial navigation, equal on all three axes of a sensor.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// let noise = inertial(format!("{IMU}gyro_bias_walk = 1e-5\n"))?.noise;
+/// assert_eq!((noise.gyro_bias_walk, noise.accel_bias_walk), (1e-5, 0.0));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct InertialNoise {
     /// White noise of gyroscope and accelerometer.
@@ -19,6 +26,16 @@ pub struct InertialNoise {
 }
 
 /// White noise of gyroscope and accelerometer, both in the same form.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// let densities = WhiteNoise::Density { gyro: 3e-4, accel: 2e-2 };
+/// assert_eq!(inertial(IMU.to_owned())?.noise.white, densities);
+/// let text = "model = 'imu'\n[noise]\ngyro_sigma_per_sample = 0.01\naccel_sigma_per_sample = 0.5\n";
+/// let sigmas = WhiteNoise::PerSample { gyro: 0.01, accel: 0.5 };
+/// assert_eq!(inertial(text.to_owned())?.noise.white, sigmas);
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WhiteNoise {
     /// Continuous densities.
@@ -35,20 +52,6 @@ pub enum WhiteNoise {
         /// Accelerometer, m/s^2.
         accel: f64,
     },
-}
-
-impl WhiteNoise {
-    /// The standard deviation of a gyroscope sample (rad/s) and of an accelerometer sample (m/s^2) that stand for
-    /// `interval_s` seconds. The interval must be positive.
-    pub fn sample_sigmas(self, interval_s: f64) -> (f64, f64) {
-        match self {
-            Self::Density { gyro, accel } => {
-                let root = interval_s.sqrt();
-                (gyro / root, accel / root)
-            }
-            Self::PerSample { gyro, accel } => (gyro, accel),
-        }
-    }
 }
 
 /// What each number of the gyroscope may be, in its own unit.

@@ -43,7 +43,7 @@ impl InertialNoise {
     ///
     /// # Errors
     /// A sentence that names the number at fault and its range.
-    pub fn from_numbers(numbers: &ProcessNoise) -> Result<Self, &'static str> {
+    pub(crate) fn from_numbers(numbers: &ProcessNoise) -> Result<Self, &'static str> {
         let foreign = [
             numbers.lateral,
             numbers.rotation_per_sqrt_m,
@@ -87,7 +87,7 @@ impl OdometryNoise {
     ///
     /// # Errors
     /// A sentence that names the number at fault and its range.
-    pub fn from_numbers(numbers: &ProcessNoise) -> Result<Self, &'static str> {
+    pub(crate) fn from_numbers(numbers: &ProcessNoise) -> Result<Self, &'static str> {
         let foreign = [numbers.gyro_bias_walk, numbers.accel_bias_walk];
         if !foreign.iter().all(|number| number.is_nan()) {
             return Err(FOREIGN);

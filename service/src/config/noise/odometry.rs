@@ -9,6 +9,13 @@ use super::super::section::Section;
 use super::{Form, Relevance, form_of};
 
 /// Process noise of odometry.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// let noise = odometry(format!("{ODOMETRY}rotation_per_sqrt_m = 1e-3\n"))?.noise;
+/// assert_eq!((noise.rotation_per_sqrt_m, noise.translation_per_sqrt_m), (1e-3, 0.0));
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OdometryNoise {
     /// White noise of the increments.
@@ -23,6 +30,14 @@ pub struct OdometryNoise {
 
 /// White noise of a row's rotation and translation, both in the same form. Lateral is across the direction of
 /// travel: body y, and in space body z too; if the file does not say, it is as the translation.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// // Across the direction of travel as along it, if the file does not say.
+/// let densities = IncrementNoise::Density { rotation: 3e-3, translation: 1e-2, lateral: 1e-2 };
+/// assert_eq!(odometry(ODOMETRY.to_owned())?.noise.white, densities);
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum IncrementNoise {
     /// Continuous densities.
@@ -46,6 +61,14 @@ pub enum IncrementNoise {
 }
 
 /// Standard deviations of one row's increment.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// let noise = odometry(format!("{ODOMETRY}lateral_density = 2e-2\n"))?.noise;
+/// let RowSigmas { translation, lateral, .. } = noise.row_sigmas(0.01, 0.0, 0.0);
+/// assert!((lateral - 2.0 * translation).abs() < 1e-12);
+/// # Ok::<(), ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowSigmas {
     /// Rotation on every axis, rad.
@@ -58,7 +81,7 @@ pub struct RowSigmas {
 
 impl OdometryNoise {
     /// The same with every standard deviation multiplied.
-    pub fn scaled(self, factor: f64) -> Self {
+    pub(crate) fn scaled(self, factor: f64) -> Self {
         Self {
             white: self.white.scaled(factor),
             rotation_per_sqrt_m: self.rotation_per_sqrt_m * factor,
@@ -69,6 +92,16 @@ impl OdometryNoise {
 
     /// The standard deviations of a row that stands for `interval_s` seconds, goes `way_m` metres and turns by
     /// `turn_rad` radians; none of them may be negative.
+    ///
+    /// ```
+    #[doc = include_str!("../example.txt")]
+    /// let noise = odometry(format!("{ODOMETRY}translation_per_sqrt_m = 0.1\n"))?.noise;
+    /// // White noise by the root of the time; with the root of the way comes what slip adds.
+    /// let (standing, moving) = (noise.row_sigmas(0.04, 0.0, 0.0), noise.row_sigmas(0.04, 9.0, 0.0));
+    /// assert!((standing.translation - 1e-2 * 0.2).abs() < 1e-12);
+    /// assert!((moving.translation.powi(2) - standing.translation.powi(2) - 0.01 * 9.0).abs() < 1e-12);
+    /// # Ok::<(), ConfigFaults>(())
+    /// ```
     pub fn row_sigmas(&self, interval_s: f64, way_m: f64, turn_rad: f64) -> RowSigmas {
         let white = self.white.row_sigmas(interval_s);
         let squared = |sigma: f64| sigma * sigma;
@@ -108,7 +141,7 @@ impl IncrementNoise {
     }
 
     /// The standard deviations of a row that stands for `interval_s` seconds, which may not be negative.
-    pub fn row_sigmas(self, interval_s: f64) -> RowSigmas {
+    fn row_sigmas(self, interval_s: f64) -> RowSigmas {
         match self {
             Self::Density {
                 rotation,

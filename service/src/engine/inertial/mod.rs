@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::driver::Engine;
 use super::fix::Fix;
 use super::levelling::Levelling;
-use super::model::{Fused, Model, Preceding};
+use super::model::{Fused, Preceding, Workings};
 use super::processor::{Processor, Work};
 use super::recovery::Widening;
 use super::resume::Doubt;
@@ -26,15 +26,24 @@ use super::settings::{
 use super::tally::Refusal;
 use crate::config::{Hold, InertialNoise};
 
-pub mod aiding;
+pub(super) mod aiding;
 mod intake;
 mod request;
-pub mod standstill;
+pub(super) mod standstill;
 
 use aiding::Aiding;
 use standstill::{Standstill, StandstillSettings};
 
 /// An inertial filter of side S on the state G (9 or 15 dimensions).
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// use inekf_service::engine::{Engine, Inertial};
+///
+/// // What its engine is made of.
+/// let engine: Engine<Inertial<NavState, Left, 15>> = engine;
+/// assert_eq!(engine.state().1, WAITING_FOR_IMU);
+/// ```
 #[derive(Debug)]
 pub struct Inertial<G, S, const D: usize> {
     imu: ImuSettings,
@@ -51,6 +60,12 @@ pub type InertialEngine<G, S, const D: usize> = Engine<Inertial<G, S, D>>;
 
 impl<G: InertialState<D>, S: InertialSide, const D: usize> InertialEngine<G, S, D> {
     /// An engine that waits for its first samples, with all the memory it will ever use.
+    ///
+    /// ```
+    #[doc = include_str!("../example.txt")]
+    /// let engine = InertialEngine::<NavState, Left, 15>::new(settings("inekf"));
+    /// assert!(engine.snapshot().is_none());
+    /// ```
     pub fn new(settings: Settings) -> Self {
         Self::of(Inertial::new(&settings), settings.fusion)
     }
@@ -112,7 +127,7 @@ impl<G: InertialState<D>, S: InertialSide, const D: usize> Inertial<G, S, D> {
     }
 }
 
-impl<G: InertialState<D>, S: InertialSide, const D: usize> Model for Inertial<G, S, D> {
+impl<G: InertialState<D>, S: InertialSide, const D: usize> Workings for Inertial<G, S, D> {
     type Sample = ImuSample;
     type Estimate = EstimateSe23;
     type Input = ImuInput;

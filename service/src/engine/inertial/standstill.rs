@@ -20,6 +20,17 @@ use nalgebra::Vector3;
 const MIN_SAMPLES: u32 = 5;
 
 /// When a vehicle stands, and what is made of it.
+///
+/// ```
+/// use inekf_service::config::Config;
+/// use inekf_service::engine::settings::Settings;
+///
+/// let text = "model = 'imu'\n[noise]\ngyro_density = 3e-4\naccel_density = 2e-2\n[zero_velocity]\nafter_s = 1.0\nperiod_s = 0.25\n";
+/// let standstill = Settings::new(&Config::from_toml_str(text, "example")?).imu.standstill;
+/// let standstill = standstill.expect("it is asked for");
+/// assert_eq!((standstill.block_ns, standstill.blocks), (250_000_000, 4));
+/// # Ok::<(), inekf_service::config::ConfigFaults>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandstillSettings {
     /// Length of a block, and so the time between two proposals, nanoseconds.

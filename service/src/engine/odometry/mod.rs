@@ -18,7 +18,7 @@ use inekf_shared::transport::InputMessage;
 use nalgebra::{SMatrix, Vector3};
 
 use super::fix::{Fix, Measurement};
-use super::model::{Fused, Model, Preceding};
+use super::model::{Fused, Preceding, Workings};
 use super::recovery::Widening;
 use super::resume::Doubt;
 use super::set_state::{checked_attitude, covariance};
@@ -26,14 +26,14 @@ use super::settings::{FusionSettings, InitialSettings, LevelSource};
 use super::tally::Refusal;
 use crate::config::OdometryNoise;
 
-pub mod bank;
-pub mod build;
-pub mod filter;
-pub mod learning;
-pub mod row;
-pub mod sighting;
-pub mod single;
-pub mod vehicle;
+mod bank;
+pub(super) mod build;
+mod filter;
+mod learning;
+mod row;
+mod sighting;
+mod single;
+mod vehicle;
 
 use filter::{PoseFilter, Report};
 use row::{Row, RowMotion};
@@ -87,7 +87,8 @@ impl<G, F, const D: usize, const N: usize, const PAIR: usize> Odometry<G, F, D, 
     }
 }
 
-impl<G, F, const D: usize, const N: usize, const PAIR: usize> Model for Odometry<G, F, D, N, PAIR>
+impl<G, F, const D: usize, const N: usize, const PAIR: usize> Workings
+    for Odometry<G, F, D, N, PAIR>
 where
     G: Vehicle<D, N>,
     F: PoseFilter<G, D, N>,

@@ -54,6 +54,14 @@ enum Phase {
 }
 
 /// How the smoothing keeps up.
+///
+/// ```
+/// use inekf_service::engine::smoothing::Effort;
+///
+/// // Of an engine that is fed no faster than it can smooth, the last three stay at zero.
+/// let effort = Effort { last: 120, most: 300, ..Effort::default() };
+/// assert_eq!((effort.early, effort.forced, effort.failed), (0, 0, 0));
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effort {
     /// Units of work done after the last sample.

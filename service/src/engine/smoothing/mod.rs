@@ -4,13 +4,13 @@
 //! is published for a sample is the newest of them, moved along the samples since as a filter would: nothing of the
 //! window is touched before. Then come the fixes that are due: each is judged against the estimate at its stamp, and
 //! if it is let in the newest state is smoothed and the samples after it are gone through again. The other states
-//! follow in pieces of bounded work, some after each sample ([`behind`]). Where the window is not ready for a fix it
+//! follow in pieces of bounded work, some after each sample (`behind`). Where the window is not ready for a fix it
 //! corrects the estimate as a plain filter's would, and the smoothed estimate takes its place some samples later, published
 //! under the same stamp as the sample then.
 //!
 //! A fix that is late, but not older than the last one, is fused as if it had been on time: once the window has seen it,
-//! the estimate is the same bit for bit ([`since`]); an older one is too late. A fix that comes between two samples waits
-//! for [`settle`](History::settle), or for the next sample to be out.
+//! the estimate is the same bit for bit (`since`); an older one is too late. A fix that comes between two samples waits
+//! for [`settle`](super::Engine::settle), or for the next sample to be out.
 //!
 //! A lock-out ends with a new window: it begins with the widened estimate, for what the old one believed is doubted.
 //!
@@ -25,20 +25,22 @@ use nalgebra::Vector3;
 
 use super::driver::Engine;
 use super::fix::Fix;
-use super::history::{Breakdown, Event, History, Insertion, MAX_FIXES};
+use super::history::{Breakdown, Event, Insertion, MAX_FIXES, Past};
 use super::inertial::Inertial;
 use super::inertial::aiding::Aiding;
-use super::model::{Fused, Model};
+use super::model::{Fused, Workings};
 use super::recovery::Lockout;
 use super::settings::{FusionSettings, Settings, SmootherSettings};
 
-pub mod behind;
+mod behind;
 mod left;
 mod pace;
-pub mod since;
-pub mod window;
+mod since;
+mod window;
 
-use behind::{Behind, Effort};
+pub use behind::Effort;
+
+use behind::Behind;
 use since::{Since, Stand};
 
 /// A fix that waits.
@@ -50,6 +52,18 @@ struct Waiting {
 }
 
 /// The estimate, the window behind it, and the fixes that wait.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// use inekf_service::engine::smoothing::Smoothing;
+/// use inekf_service::engine::{Engine, Inertial};
+///
+/// let settings = settings("smoother");
+/// let smoother = settings.smoother.expect("it is asked for");
+/// let engine: Engine<Inertial<NavState, Left, 15>, Smoothing<NavState, 15>> =
+///     SmoothingEngine::smoothing(settings, &smoother);
+/// assert_eq!(engine.state().1, WAITING_FOR_IMU);
+/// ```
 #[derive(Debug)]
 pub struct Smoothing<G, const D: usize> {
     late_window_ns: u64,
@@ -91,12 +105,36 @@ pub type SmoothingEngine<G, const D: usize> = Engine<Inertial<G, Left, D>, Smoot
 
 impl<G: InertialState<D> + 'static, const D: usize> SmoothingEngine<G, D> {
     /// An engine that waits for its first samples, with all the memory it will ever use.
+    ///
+    /// ```
+    #[doc = include_str!("../example.txt")]
+    /// let settings = settings("smoother");
+    /// let smoother = settings.smoother.expect("it is asked for");
+    /// let mut engine = SmoothingEngine::<NavState, 15>::smoothing(settings, &smoother);
+    /// engine.sample(&at_rest(10), 0, &mut estimates);
+    /// // At first the window holds the start.
+    /// assert_eq!(engine.smoothed(&mut |_| {}), Ok(1));
+    /// ```
     pub fn smoothing(settings: Settings, smoother: &SmootherSettings) -> Self {
         let history = Smoothing::new(&settings.fusion, smoother);
         Self::with_history(Inertial::new(&settings), settings.fusion, history)
     }
 
     /// How the smoothing keeps up with the samples.
+    ///
+    /// ```
+    #[doc = include_str!("../example.txt")]
+    /// let settings = settings("smoother");
+    /// let smoother = settings.smoother.expect("it is asked for");
+    /// let mut engine = SmoothingEngine::<NavState, 15>::smoothing(settings, &smoother);
+    /// for step in 1..=40 {
+    ///     engine.sample(&at_rest(10 * step), 0, &mut estimates);
+    /// }
+    /// engine.position(&east(400, 0.0), &mut estimates);
+    /// engine.settle(&mut estimates);
+    /// // One fix, and the window was ready for it.
+    /// assert_eq!((engine.effort().early, engine.effort().failed), (0, 0));
+    /// ```
     pub fn effort(&self) -> Effort {
         self.history().behind.effort()
     }
@@ -104,7 +142,7 @@ impl<G: InertialState<D> + 'static, const D: usize> SmoothingEngine<G, D> {
 
 impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
     /// An empty history with all the memory it will ever use.
-    pub fn new(fusion: &FusionSettings, smoother: &SmootherSettings) -> Self
+    fn new(fusion: &FusionSettings, smoother: &SmootherSettings) -> Self
     where
         G: 'static,
     {
@@ -221,7 +259,7 @@ impl<G: InertialState<D>, const D: usize> Smoothing<G, D> {
     }
 }
 
-impl<G: InertialState<D>, const D: usize> History<Inertial<G, Left, D>> for Smoothing<G, D> {
+impl<G: InertialState<D>, const D: usize> Past<Inertial<G, Left, D>> for Smoothing<G, D> {
     fn start(
         &mut self,
         model: &Inertial<G, Left, D>,

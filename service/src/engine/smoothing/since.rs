@@ -15,7 +15,7 @@ use inekf::model::{ImuInput, InertialState};
 use inekf::smoother::Preintegration;
 
 use super::super::inertial::{ImuMotion, Inertial};
-use super::super::model::Model;
+use super::super::model::Workings;
 use super::super::settings::FusionSettings;
 use super::behind::Ready;
 use super::window::nowhere;

@@ -211,16 +211,6 @@ impl EstimateHead {
 /// assert_eq!(estimate.covariance[along].sqrt(), 0.5);
 /// assert_eq!(size_of::<EstimateSe23>(), 1288);
 /// ```
-///
-/// ```
-/// use inekf_shared::message::{EstimateSe2, Zero, triangle_index};
-///
-/// let mut estimate = EstimateSe2::ZERO;
-/// // theta, x, y.
-/// let heading = triangle_index(0, 0, 3).expect("in the triangle");
-/// estimate.covariance[heading] = 0.04;
-/// assert_eq!(estimate.covariance[0].sqrt(), 0.2);
-/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.EstimateSe23.v2")]
@@ -285,6 +275,16 @@ layout! {
 }
 
 /// Estimate of the planar odometry model: a pose on SE(2).
+///
+/// ```
+/// use inekf_shared::message::{EstimateSe2, Zero, triangle_index};
+///
+/// let mut estimate = EstimateSe2::ZERO;
+/// // theta, x, y.
+/// let heading = triangle_index(0, 0, 3).expect("in the triangle");
+/// estimate.covariance[heading] = 0.04;
+/// assert_eq!(estimate.covariance[0].sqrt(), 0.2);
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend, Serialize, Deserialize)]
 #[type_name("inekf.EstimateSe2.v2")]
@@ -330,9 +330,24 @@ pub trait EstimateMessage: Message {
     const MODEL: u32;
 
     /// Stamps, flags and counters.
+    ///
+    /// ```
+    /// use inekf_shared::message::{EstimateMessage, EstimateSe3, Zero};
+    ///
+    /// let estimate = EstimateSe3::ZERO;
+    /// assert_eq!(estimate.head(), &estimate.head);
+    /// ```
     fn head(&self) -> &EstimateHead;
 
     /// Stamps, flags and counters, to be written.
+    ///
+    /// ```
+    /// use inekf_shared::message::{EstimateMessage, EstimateSe3, Zero};
+    ///
+    /// let mut estimate = EstimateSe3::ZERO;
+    /// estimate.head_mut().stamp_ns = 7;
+    /// assert_eq!(estimate.head.stamp_ns, 7);
+    /// ```
     fn head_mut(&mut self) -> &mut EstimateHead;
 }
 

@@ -203,6 +203,29 @@ impl<const M: usize> Factor<M> {
         inverse
     }
 
+    /// `tr(S^-1 A)` of a symmetric A, M x M: of `D^-1 L^-1 A L^-T`.
+    #[inline]
+    pub(crate) fn trace_of_quotient(&self, a: &SMatrix<f64, M, M>) -> f64 {
+        let mut b = *a;
+        let mut trace = 0.0;
+        for i in 0..M {
+            for k in 0..i {
+                for column in 0..M {
+                    b[(i, column)] -= self.l[(i, k)] * b[(k, column)];
+                }
+            }
+            let mut row = [0.0; M];
+            for j in 0..=i {
+                row[j] = b[(i, j)];
+                for k in 0..j {
+                    row[j] -= self.l[(j, k)] * row[k];
+                }
+            }
+            trace += row[i] * self.reciprocals[i];
+        }
+        trace
+    }
+
     /// `z^T S^-1 z`.
     ///
     /// ```
@@ -240,5 +263,21 @@ impl<const M: usize> Factor<M> {
         } else {
             self.pivots.iter().map(|pivot| pivot.ln()).sum()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::*;
+
+    #[test]
+    fn the_trace_of_a_quotient_is_that_of_the_product_with_the_inverse() {
+        let s = Matrix3::new(4.0, 1.0, -0.5, 1.0, 3.0, 0.2, -0.5, 0.2, 2.0);
+        let a = Matrix3::new(7.0, -2.0, 0.3, -2.0, 5.0, 1.1, 0.3, 1.1, 9.0);
+        let expected = (s.try_inverse().expect("definite") * a).trace();
+        let factor = Factor::new(&s).expect("definite");
+        assert!((factor.trace_of_quotient(&a) - expected).abs() < 1e-14 * expected);
     }
 }

@@ -46,6 +46,8 @@ pub struct Linearised<G, const D: usize, const M: usize> {
     seen: Seen<D>,
     /// S.
     covariance: SMatrix<f64, M, M>,
+    /// Factor of N.
+    noise_factor: Factor<M>,
 }
 
 /// `N + H B`, passing over the states that the sensor does not see.
@@ -70,28 +72,14 @@ fn sum_of_product<const D: usize, const M: usize>(
 /// Whether `P - K S K^T` loses no more than three of the digits of P: the update leaves of no variance less than
 /// the thousandth part, for `tr(N^-1 S)` is above the largest ratio of S and N along any direction.
 #[inline(always)]
-pub(crate) fn is_mild<const M: usize>(
-    noise: &SMatrix<f64, M, M>,
-    innovation: &SMatrix<f64, M, M>,
-) -> bool {
+pub(crate) fn is_mild<const M: usize>(noise: &Factor<M>, innovation: &SMatrix<f64, M, M>) -> bool {
     const LARGEST_RATIO: f64 = 1e3;
-    let Some(noise) = Factor::new(noise) else {
-        return false;
-    };
-    let mut trace = 0.0;
-    for m in 0..M {
-        let mut column = SVector::<f64, M>::zeros();
-        for row in 0..M {
-            column[row] = innovation[(row, m)];
-        }
-        trace += noise.solve(&column)[m];
-    }
-    trace < LARGEST_RATIO
+    noise.trace_of_quotient(innovation) < LARGEST_RATIO
 }
 
 impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
-    /// `observation` around `chi`, which lies `xi` away from the mean of `belief`. `None` if the innovation
-    /// covariance is not positive definite.
+    /// `observation` around `chi`, which lies `xi` away from the mean of `belief`. `None` if the noise or the
+    /// innovation covariance is not positive definite.
     ///
     /// ```
     /// # use inekf::model::{PlanarFix, PointFix};
@@ -117,13 +105,29 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     /// // No noise is negative.
     /// assert!(Linearised::at(&belief, &fix, &belief.mean, &SVector::zeros(), &(-2.0 * noise)).is_none());
     /// ```
-    #[inline(always)]
     pub fn at<S, O>(
         belief: &Belief<G, S, D>,
         observation: &O,
         chi: &G,
         xi: &SVector<f64, D>,
         noise: &SMatrix<f64, M, M>,
+    ) -> Option<Self>
+    where
+        S: Side,
+        O: Observation<G, D, M>,
+    {
+        let noise_factor = Factor::new(noise)?;
+        Self::with_noise(belief, observation, chi, xi, (noise, &noise_factor))
+    }
+
+    /// The same with the noise and its factor.
+    #[inline(always)]
+    pub(super) fn with_noise<S, O>(
+        belief: &Belief<G, S, D>,
+        observation: &O,
+        chi: &G,
+        xi: &SVector<f64, D>,
+        (noise, noise_factor): (&SMatrix<f64, M, M>, &Factor<M>),
     ) -> Option<Self>
     where
         S: Side,
@@ -149,6 +153,7 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
             innovation,
             seen,
             covariance,
+            noise_factor: *noise_factor,
         })
     }
 
@@ -211,7 +216,7 @@ impl<G: LieGroup<D>, const D: usize, const M: usize> Linearised<G, D, M> {
     /// `is_mild`, of this one.
     #[inline(always)]
     pub(super) fn is_mild(&self) -> bool {
-        is_mild(&self.noise, &self.covariance)
+        is_mild(&self.noise_factor, &self.covariance)
     }
 
     /// `P H^T L^-T`, with `S = L D L^T`.

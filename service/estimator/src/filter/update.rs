@@ -343,7 +343,8 @@ where
     let (mut log_determinant, mut current_cost) = (0.0, 0.0);
     let mut iterations = 0;
     let mut covariance = loop {
-        let linearised = Linearised::at(belief, observation, &chi, &current.xi, &noise)
+        let of_noise = (&noise, &noise_factor);
+        let linearised = Linearised::with_noise(belief, observation, &chi, &current.xi, of_noise)
             .ok_or(UpdateError::InnovationNotPositiveDefinite)?;
         if iterations == 0 {
             judgement = rule.judge(&linearised)?;

@@ -161,7 +161,7 @@ impl<G: InertialState<D>, const D: usize> Knot<G, D> {
         let weight = factor.inverse();
         let gain = times(&p_ht, &weight);
         // As the filter does it.
-        if is_mild(&noise, &innovation) {
+        if Factor::new(&noise).is_some_and(|noise| is_mild(&noise, &innovation)) {
             let decorrelated = factor.decorrelated_rows(&p_ht);
             self.filtered.reduce(&decorrelated, factor.reciprocals());
         } else {
